@@ -114,16 +114,18 @@ def _runs_wide(library: Path) -> bool:
 
 
 def _compiled(library: Path, files: list[Path], flags: tuple[str, ...]) -> Path:
-    """Compile files on all processors and link them."""
+    """Compile files on all processors, which zig does by itself, and link them."""
     command = [*compiler().command, *FLAGS, *flags, f'-DCSRC_DIGEST="{digest()}"']
-    shares = [files[n :: os.cpu_count() or 1] for n in range(min(os.cpu_count() or 1, len(files)))]
+    parts = [str(path) for path in files]
     with tempfile.TemporaryDirectory(dir=library.parent) as work:
-        begun = [subprocess.Popen([*command, "-c", *map(str, share)], cwd=work) for share in shares]  # noqa: S603
-        for compiling in begun:
-            if compiling.wait():
-                raise subprocess.CalledProcessError(compiling.returncode, compiling.args)
-        objects = sorted(path.name for path in Path(work).glob("*.o*"))  # .obj for Windows
-        subprocess.run([*command, "-shared", "-o", library.name, *objects, "-lm"], cwd=work, check=True)  # noqa: S603
+        if not needs_zig():
+            count = min(os.cpu_count() or 1, len(parts))
+            begun = [subprocess.Popen([*command, "-c", *parts[n::count]], cwd=work) for n in range(count)]  # noqa: S603
+            for compiling in begun:
+                if compiling.wait():
+                    raise subprocess.CalledProcessError(compiling.returncode, compiling.args)
+            parts = sorted(path.name for path in Path(work).glob("*.o"))
+        subprocess.run([*command, "-shared", "-o", library.name, *parts, "-lm"], cwd=work, check=True)  # noqa: S603
         (Path(work) / library.name).replace(library)
     return library
 

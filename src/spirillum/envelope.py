@@ -17,6 +17,11 @@ def quantity(value: float | Iterable[float] | None, unit: str, **more: Any) -> d
     return {"value": _finite(value), "unit": unit, **more}
 
 
+def interval(low: float, high: float, level: float = 0.95) -> dict[str, Any]:
+    """Entries of a quantity that has an interval; none where its lower limit is not finite."""
+    return {"low": low, "high": high, "kind": "interval", "level": level} if math.isfinite(low) else {}
+
+
 def _finite(value: Any) -> Any:
     if value is None:
         return None

@@ -124,7 +124,7 @@ def test_a_robot_in_anothers_channel_is_refused(tmp_path: Path) -> None:
     [
         (
             ["calibrate", "observations.csv", WIDE, "-o", ""],
-            "an empty name of a file; allowed: a folder for the results",
+            "-o '' is empty; allowed: -o DIR",
         ),
         (["suggest", "posterior.nc", "--rows", "0"], "rows = 0; allowed: at least 1"),
     ],

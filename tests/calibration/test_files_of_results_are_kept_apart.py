@@ -53,7 +53,7 @@ def test_figures_of_an_earlier_run_go_and_changed_ones_stay(
     found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("spirillum.view.figures.calibration.calibration_figures", small_figures)
-    write_calibration(found, tmp_path)
+    write_calibration(found, tmp_path, vector=True)
     (tmp_path / "figures" / "my-own.png").write_bytes(b"mine")
     assert {path.name for path in earlier_results(tmp_path)} == {
         "calibration.toml",

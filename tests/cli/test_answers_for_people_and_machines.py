@@ -163,7 +163,7 @@ def test_every_help_has_an_example_that_runs(run: Callable[..., Any], tmp_path: 
     from spirillum.results import study as study_results
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(study_results, "write_report", lambda *_: None)
+    monkeypatch.setattr(study_results, "write_report", lambda *_, **__: None)
     monkeypatch.setenv("COLUMNS", "200")
     commands = ["predict", "resistance", "study", "simulate", "schema", "citation", "robot new", "robot show"]
     for command in [*commands, "robot check"]:

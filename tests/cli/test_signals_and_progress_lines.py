@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from spirillum.cli import renderer
-from spirillum.cli.renderer import ProgressLines
+from spirillum.cli.progress import ProgressLines
 from spirillum.fluid.tube.progress_messages import kept_after
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no such signals")

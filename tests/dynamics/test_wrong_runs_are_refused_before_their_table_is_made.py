@@ -89,10 +89,10 @@ def test_least_gap_that_is_resolved_directly_is_told() -> None:
 
 
 @pytest.mark.usefixtures("unplaced")
-def test_run_is_kept_where_its_picture_cannot_be_written(tmp_path: Path) -> None:
+def test_run_whose_picture_cannot_be_written_is_refused_before_it(tmp_path: Path) -> None:
     run, lost = tmp_path / "run.nc", "/proc/run.png"
     arguments = ["simulate", "biorob2012-wide", "--motion", "held", "--turns", "0.1", "-o", str(run), "--plot", lost]
     found = CliRunner().invoke(app, arguments)
     assert found.exit_code != 0
-    assert run.exists()
-    assert "the run is written, the plot is not: /proc/run.png cannot be written" in str(found.exception)
+    assert not run.exists()
+    assert "/proc/run.png cannot be written" in str(found.exception)

@@ -229,17 +229,17 @@ def test_an_interrupted_calibration_is_run_again_and_loses_nothing(
     assert found.files == ("calibration.toml", "predictions.csv")
 
 
-def _stopped_at_the_second(drawn: Callable[..., tuple[Path, Path]]) -> Callable[..., tuple[Path, Path]]:
+def _stopped_at_the_second(drawn: Callable[..., list[Path]]) -> Callable[..., list[Path]]:
     from spirillum.view.figures.style import new_figure
 
     count = 0
 
-    def save(_figure: object, path: Path) -> tuple[Path, Path]:
+    def save(_figure: object, path: Path, **options: bool) -> list[Path]:
         nonlocal count
         count += 1
         if count == 2:
             raise KeyboardInterrupt
-        return drawn(new_figure(1.0, 1.0), path)
+        return drawn(new_figure(1.0, 1.0), path, **options)
 
     return save
 

@@ -239,7 +239,7 @@ def test_a_posterior_that_is_whole_is_read_and_one_that_was_changed_is_not(tmp_p
 
 
 def test_a_damaged_dataset_of_a_study_is_computed_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
     study = {"title": "t", "models": ["sbt"], "robots": [WIDE]}
     whole = sp.study(study, output=tmp_path)
     path = tmp_path / "dataset.nc"

@@ -207,7 +207,7 @@ def test_the_report_stands_alone_and_says_flags_and_failures(
     assert "a body that turns faster or slower by whole multiples of 15 Hz" in page
     assert "http" not in page.replace("http-equiv", "")
     assert page.count("data:image/png;base64,") == 1
-    assert (tmp_path / "out" / "figures" / "series-b.svg").exists()
+    assert (tmp_path / "out" / "figures" / "series-b.png").exists()
     assert 'src="figures' not in page
 
 

@@ -62,8 +62,8 @@ def small_study(**more: Any) -> Any:
     return sp.study({"title": "Small", "grid": grid, **more})
 
 
-def written(dataset: Any, folder: Path) -> Page:
-    write_report(dataset, folder, lambda *_: None)
+def written(dataset: Any, folder: Path, *, vector: bool = False) -> Page:
+    write_report(dataset, folder, lambda *_: None, vector=vector)
     return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 
@@ -82,7 +82,7 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, Any]:
     dataset = sp.study(study)
     with pytest.MonkeyPatch.context() as patch:  # what is drawn is no matter of the report
         patch.setattr(Picture, "figure", lambda _picture: new_figure(1.0, 1.0))
-        return folder, written(dataset, folder), dataset
+        return folder, written(dataset, folder, vector=True), dataset
 
 
 def test_folder_holds_the_results_and_nothing_half_written(paper: tuple[Path, Page, Any]) -> None:

@@ -93,7 +93,7 @@ def test_models_and_band_override_the_file(leaning: Any, question: dict[str, obj
 def test_interrupted_band_resumes_where_it_stopped(
     leaning: Any, question: dict[str, object], banded: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
     done: list[int] = []
     original = BandTask.answer
 

@@ -79,7 +79,9 @@ def test_what_does_not_go_together_is_refused(fitted: Path) -> None:
 
 
 def test_another_calibration_is_another_study(fitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)  # takes longest, and is not asked for
+    monkeypatch.setattr(
+        "spirillum.results.study.write_report", lambda *_, **__: None
+    )  # takes longest, and is not asked for
     sp.study(STUDY, output=tmp_path / "study")
     with pytest.raises(InputError, match="holds another study"):
         sp.study(STUDY, calibration=fitted / "calibration.toml", output=tmp_path / "study")

@@ -69,7 +69,7 @@ def test_robots_with_and_without_a_channel_need_a_named_model() -> None:
 def test_study_without_any_answer_ends_as_bad_input_does(
     amplitudes: str, code: int, tmp_path, capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
     (tmp_path / "study.toml").write_text(TAILS.format(amplitudes=amplitudes))
     with pytest.raises(SystemExit) as ended:
         main(["study", str(tmp_path / "study.toml"), "-o", str(tmp_path / "out"), "--json"])

@@ -198,7 +198,7 @@ def test_processes_answer_what_one_answers(
     small: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the work is long enough to be shared out; studies below that stay in one process."""
-    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
     alone = sp.study(small, output=tmp_path / "one")
     monkeypatch.setattr(run, "_SHORT", 0)
     assert sp.study(small, output=tmp_path / "two", workers=2).identical(alone)

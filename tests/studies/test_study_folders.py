@@ -14,7 +14,7 @@ from spirillum.studies.work import ModelTask
 @pytest.fixture(autouse=True)
 def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures and report have tests of their own."""
-    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
 
 
 def test_interrupted_study_resumes_where_it_stopped(

@@ -420,7 +420,7 @@ def whole_files(folder: Path) -> dict[str, bytes]:
         if parts is not None and not (folder / "part.npz").exists():
             shutil.copy(parts / task.file_name, folder / "part.npz")
 
-    report, run.keep, written.write_report = written.write_report, copied, lambda *_: None
+    report, run.keep, written.write_report = written.write_report, copied, lambda *_, **__: None
     try:
         sp.study(folder / "s.toml", output=folder / "out")
         sp.study(folder / "s.toml", store=folder / "out.zarr")

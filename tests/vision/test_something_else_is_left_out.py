@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spirillum.vision.track.assembly import something_else, something_else_flag
+from spirillum.vision.track.false_detection import something_else, something_else_flag
 
-LENGTH = 0.04
+LENGTH, PIXEL = 0.04, 2.5e-4
 TIME = np.arange(150) / 30.0
 
 
@@ -16,13 +16,19 @@ def way(seed: int = 0) -> np.ndarray:
     )
 
 
+def other(place: np.ndarray, marked: np.ndarray) -> np.ndarray:
+    """What is found where stripes are read on the marked frames, and the tail on none."""
+    stripes = np.where(marked[:, None], 0.1, np.nan) * np.ones(2)
+    return something_else(TIME, place, (stripes, np.full(stripes.shape, np.nan)), LENGTH, PIXEL)
+
+
 @pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 100), (110, 150)])
 @pytest.mark.parametrize("off", [(0.012, 0.0), (-0.02, 0.005), (0.0, 0.008)])
 def test_a_stretch_beside_the_robot_is_found(first: int, last: int, off: tuple[float, float]) -> None:
     place, marked = way(), np.ones(TIME.size, dtype=bool)
     place[first:last] += off
     marked[first:last] = False
-    found = something_else(TIME, place, marked, LENGTH)
+    found = other(place, marked)
     assert np.flatnonzero(found).tolist() == list(range(first, last))
     assert f"on {last - first} frames" in something_else_flag(found)[0].sentence
 
@@ -32,17 +38,27 @@ def test_the_robot_without_marks_stays(first: int, last: int) -> None:
     """Glare may hide stripes and tail for a while: the body goes on its way."""
     place, marked = way(), np.ones(TIME.size, dtype=bool)
     marked[first:last] = False
-    assert not something_else(TIME, place, marked, LENGTH).any()
+    assert not other(place, marked).any()
     assert something_else_flag(np.zeros(3, dtype=bool)) == ()
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 120), (90, 150)])
+def test_an_outline_that_stays_behind_is_left_out(first: int, last: int) -> None:
+    """The robot is taken away, or hidden, and the outline sticks to a line of a grid: nothing jumps."""
+    place, marked = way(), np.ones(TIME.size, dtype=bool)
+    place[first:last] = place[first - 1 if first else last]
+    marked[first:last] = False
+    found = other(place, marked)
+    assert np.flatnonzero(found).tolist() == list(range(first, last))
 
 
 def test_jumps_of_a_robot_whose_marks_are_read_are_not_its_business() -> None:
     """Cut films and lost frames have flags of their own."""
     place = way()
     place[75:] += (0.02, 0.0)
-    assert not something_else(TIME, place, np.ones(TIME.size, dtype=bool), LENGTH).any()
+    assert not other(place, np.ones(TIME.size, dtype=bool)).any()
     few = np.arange(TIME.size) < 11
-    assert not something_else(TIME, place, few, LENGTH).any()
+    assert not other(place, few).any()
 
 
 def test_a_robot_that_goes_on_after_a_cut_without_marks_is_left_out_but_not_before() -> None:
@@ -50,4 +66,4 @@ def test_a_robot_that_goes_on_after_a_cut_without_marks_is_left_out_but_not_befo
     place[50] = np.nan
     place[51:70] += (0.0, 0.01)
     marked[51:70] = False
-    assert np.flatnonzero(something_else(TIME, place, marked, LENGTH)).tolist() == list(range(51, 70))
+    assert np.flatnonzero(other(place, marked)).tolist() == list(range(51, 70))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,11 +17,11 @@ from spirillum.calibration.identifiability import Identifiability
 from spirillum.calibration.least_squares import LeastSquares, PaperFit
 from spirillum.calibration.likelihood import LEAST_RELATIVE
 from spirillum.calibration.methods import Method
-from spirillum.calibration.parameters import LEVEL, Estimate
+from spirillum.calibration.parameters import Estimate
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
 from spirillum.calibration.problem import Problem
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, interval, quantity
 from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
 from spirillum.notes import Note, note_attributes
 from spirillum.version import versions
@@ -94,12 +93,6 @@ class Calibrated(DisplayMixin):
         return envelope("calibration", _content(self) | written, self.warnings)
 
 
-def _interval(item: Estimate) -> dict[str, Any]:
-    if not math.isfinite(item.low):
-        return {}
-    return {"low": item.low, "high": item.high, "kind": "interval", "level": LEVEL}
-
-
 def _content(found: Calibrated) -> dict[str, Any]:
     """What was fitted, quantity by quantity."""
     problem, experiment = found.problem, found.experiment
@@ -107,7 +100,7 @@ def _content(found: Calibrated) -> dict[str, Any]:
         item.label: quantity(
             found.values[item.label].value,
             item.parameter.unit or "1",
-            **_interval(found.values[item.label]),
+            **found.values[item.label].interval,
             meaning=item.parameter.meaning,
             prior=item.prior.words(item.parameter.unit) if found.method == "posterior" else None,
         )
@@ -124,7 +117,7 @@ def _content(found: Calibrated) -> dict[str, Any]:
         "friction": found.reading,
         "parameters": parameters,
         **({"effective_friction_statement": found.friction_statement} if found.friction_statement else {}),
-        "discrepancy": {name: quantity(v.value, "1", **_interval(v)) for name, v in found.discrepancy.items()},
+        "discrepancy": {name: quantity(v.value, "1", **v.interval) for name, v in found.discrepancy.items()},
         "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
         "tails": [_tail(found, place) for place in range(experiment.size)],
     }
@@ -162,14 +155,13 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
     }
     if found.friction:
         item = found.friction[place]
-        content["effective_friction"] = quantity(item.value, "N m s/rad", **_interval(item))
+        content["effective_friction"] = quantity(item.value, "N m s/rad", **item.interval)
     for name, (values, low, high) in found.predicted.items():
         unit, _ = MEANINGS[name]
-        ends = {}
-        if math.isfinite(low[place]):
-            ends = {"low": float(low[place]), "high": float(high[place]), "kind": "interval", "level": LEVEL}
         content[f"{name}_observed"] = quantity(float(found.problem.ratio(name).mean[place]), unit)
-        content[f"{name}_predicted"] = quantity(float(values[place]), unit, **ends)
+        content[f"{name}_predicted"] = quantity(
+            float(values[place]), unit, **interval(float(low[place]), float(high[place]))
+        )
     if found.friction:
         content["effective_friction_per_percent"] = {
             field: quantity(0.01 * float(change[place]), "N m s/rad")

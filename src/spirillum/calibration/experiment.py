@@ -172,13 +172,24 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         groups.setdefault(item.tail, []).append(item)
     _check_signs(path, observations, by_channel)
     _check_variety(path, observations)
-    _check_zeros(path, observations)
+    for name, column in (("forward_velocity", "forward_velocity_mm_s"), ("body_rate", "body_rate_Hz")):
+        known = [item for item in observations if np.isfinite(getattr(item, name))]
+        if known and all(getattr(item, name) == 0.0 for item in known):
+            raise InputError(
+                f"{path}, row {known[0].row}, column {column}: 0, as in all rows; allowed: what was observed, or an "
+                "empty column where it was not"
+            )
     items = list(groups.values())
     channels = tuple(sorted({group[0].tail[0] for group in items}))
     for group in items:
         _check_direction(path, group)
     ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
-    _check_rates(path, observations, ratios)
+    speeds = [item for item in observations if np.isfinite(item.forward_velocity)]
+    if speeds and not any(np.isfinite(seen.advance.mean) for seen in ratios):
+        raise InputError(
+            f"{path}, row {speeds[0].row}, column tail_rate_Hz: empty, as in all rows with a speed; allowed: "
+            "tail_rate_Hz or motor_rate_Hz beside each speed, which is compared per rate"
+        )
     table = observation_table(path)
     return Experiment(
         robots=tuple(
@@ -338,27 +349,6 @@ def _ratios(path: Path, items: Sequence[ObservationRow], hand: float) -> _Seen:
             "backwards; allowed: a robot that swims the way that its tail drives"
         )
     return found
-
-
-def _check_rates(path: Path, observations: Sequence[ObservationRow], found: Sequence[_Seen]) -> None:
-    """Refuse speeds without rates: the tail's rotation rate must be known too."""
-    speeds = [item for item in observations if np.isfinite(item.forward_velocity)]
-    if speeds and not any(np.isfinite(seen.advance.mean) for seen in found):
-        raise InputError(
-            f"{path}, row {speeds[0].row}, column tail_rate_Hz: empty, as in all rows with a speed; allowed: "
-            "tail_rate_Hz or motor_rate_Hz beside each speed, which is compared per rate"
-        )
-
-
-def _check_zeros(path: Path, observations: Sequence[ObservationRow]) -> None:
-    """Refuse a column of zeros: no model has a robot that does not move at all, and errors are relative."""
-    for name, column in (("forward_velocity", "forward_velocity_mm_s"), ("body_rate", "body_rate_Hz")):
-        known = [item for item in observations if np.isfinite(getattr(item, name))]
-        if known and all(getattr(item, name) == 0.0 for item in known):
-            raise InputError(
-                f"{path}, row {known[0].row}, column {column}: 0, as in all rows; allowed: what was observed, or an "
-                "empty column where it was not"
-            )
 
 
 def _of_trials(values: Samples, *relative: Samples) -> _Trials:

@@ -41,7 +41,7 @@ from spirillum.calibration.identifiability import (
 from spirillum.calibration.least_squares import LeastSquares, least_squares_fit, paper_fit, sampled_fit
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.parameters import LEVEL, UNWALLED, Estimate, assumed_uncertainties, free_names, is_free_in
-from spirillum.calibration.posterior import Sampling, sampled
+from spirillum.calibration.posterior import Posterior, Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
@@ -117,7 +117,9 @@ def fit_model(
         raise InputError(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
         )
-    _check_answer(answer, method)
+    check_choice("answer", answer, (HELD, RELEASED))
+    if answer == RELEASED and method == "paper":
+        raise InputError("answer = 'trial' with method 'paper', which inverts held motion; allowed: another method")
     if model != AUTO:
         free_names(free, find_swimmer_model(model, AUTO).name, released=answer == RELEASED)
     if prepare and not is_fitted_in_tube(model, free, method):
@@ -139,13 +141,6 @@ def fit_model(
     return replace(found, model_reason=choice.reason)
 
 
-def _check_answer(answer: str, method: str) -> None:
-    """Refuse a fit of trials by the method that inverts held motion."""
-    check_choice("answer", answer, (HELD, RELEASED))
-    if answer == RELEASED and method == "paper":
-        raise InputError("answer = 'trial' with method 'paper', which inverts held motion; allowed: another method")
-
-
 def _fitted_by(
     method: str, problem: Problem, friction: str, sampling: Sampling | None, progress: Progress | None
 ) -> Calibrated:
@@ -155,9 +150,8 @@ def _fitted_by(
     check_identifiable(problem, fit.z)
     check_plausible(problem, fit.z)
     report = identified(problem, fit)
-    if method == "least-squares":
-        return _by_least_squares(problem, fit, report, friction)
-    return _by_posterior(problem, fit, report, friction, sampling, progress)
+    posterior = None if method == "least-squares" else sampled(problem, fit, sampling, progress)
+    return _by_draws(problem, fit, report, reading=friction, posterior=posterior)
 
 
 def _has_motor(experiment: Experiment) -> bool:
@@ -204,76 +198,35 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
     )
 
 
-def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> Calibrated:
-    """Intervals from draws around the best fit, in coordinates."""
-    rng = np.random.default_rng(1)
-    z, tau = sampled_fit(problem, fit, _FRICTION_DRAWS, rng)
-    draws = problem.values(z)
-    values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(fit.z).items()}
-    given, within, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
-    sensitivity = friction_sensitivity(problem, fit.z, reading)
-    predicted = _predicted(problem, fit.z, z, tau, rng)
-    # Moments of a few residuals may give none, or one at the end of what may be: the middle of that is stated.
-    discrepancy = {name: _middle(tau[name]) for name in fit.discrepancy}
-    warnings = [
-        *_of_the_fit(problem, fit, report, reading),
-        *misfit_warnings(problem, discrepancy, fit),
-        *narrow_channel_warnings(problem, values),
-        *common_warnings(problem, friction),
-    ]
-    return Calibrated(
-        problem=problem,
-        method="least-squares",
-        reading=reading,
-        values=values,
-        friction=friction,
-        friction_given=given,
-        friction_within_model=within,
-        friction_sensitivity=sensitivity,
-        friction_statement=friction_statement(problem, within, sensitivity),
-        predicted=predicted,
-        discrepancy=discrepancy,
-        error=fit.error,
-        paper=None,
-        least_squares=fit,
-        posterior=None,
-        identifiability=report,
-        warnings=tuple(warnings),
-    )
-
-
-def _by_posterior(
-    problem: Problem,
-    fit: LeastSquares,
-    report: Identifiability,
-    reading: str,
-    sampling: Sampling | None,
-    progress: Progress | None,
+def _by_draws(
+    problem: Problem, fit: LeastSquares, report: Identifiability, *, reading: str, posterior: Posterior | None
 ) -> Calibrated:
-    posterior = sampled(problem, fit, sampling, progress)
+    """Estimates with intervals from draws: of a posterior, else in coordinates around the best fit."""
     rng = np.random.default_rng(1)
-    chosen = posterior.flat[rng.permutation(posterior.flat.shape[0])[:_FRICTION_DRAWS]]
-    own = chosen[:, : len(problem.coordinates)]
-    middle = np.median(posterior.flat[:, : len(problem.coordinates)], axis=0)
-    every = {name: values.reshape(-1) for name, values in posterior.values().items()}
-    tau, sigma = posterior.density.nuisances(chosen)
-    discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
-    error = {name: float(np.median(s)) for name, s in sigma.items()}
-    given, within, friction = _friction(problem, own, middle, error, reading, rng)
+    if posterior is None:
+        z, tau = sampled_fit(problem, fit, _FRICTION_DRAWS, rng)
+        middle, error, of_a_trial, draws = fit.z, fit.error, fit.error, problem.values(z)
+        values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(middle).items()}
+        # Moments of a few residuals may give none, or one at the end of what may be: the middle of that is stated.
+        discrepancy = {name: _middle(tau[name]) for name in fit.discrepancy}
+        unusable = []
+    else:
+        chosen = posterior.flat[rng.permutation(posterior.flat.shape[0])[:_FRICTION_DRAWS]]
+        free = posterior.flat[:, : len(problem.coordinates)]
+        z, middle = chosen[:, : len(problem.coordinates)], np.median(free, axis=0)
+        every = {name: one.reshape(-1) for name, one in posterior.values().items()}
+        tau, sigma = posterior.density.nuisances(chosen)
+        error = {name: float(np.median(s)) for name, s in sigma.items()}
+        of_a_trial = {name: float(np.median(every[f"error_{name}"])) for name in problem.quantities}
+        values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
+        discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
+        unusable = [Note("posterior-unusable", f"do not use the posterior: {words}") for words in posterior.problems()]
+        unusable += edge_warnings(problem, free)
+    given, within, friction = _friction(problem, z, middle, error, reading, rng)
     sensitivity = friction_sensitivity(problem, middle, reading)
-    values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
-    wrong = [Note("posterior-unusable", f"do not use the posterior: {words}") for words in posterior.problems()]
-    warnings = [
-        *wrong,
-        *edge_warnings(problem, posterior.flat[:, : len(problem.coordinates)]),
-        *_of_the_fit(problem, fit, report, reading),
-        *misfit_warnings(problem, discrepancy, fit),
-        *narrow_channel_warnings(problem, values),
-        *common_warnings(problem, friction),
-    ]
     return Calibrated(
         problem=problem,
-        method="posterior",
+        method="least-squares" if posterior is None else "posterior",
         reading=reading,
         values=values,
         friction=friction,
@@ -281,25 +234,25 @@ def _by_posterior(
         friction_within_model=within,
         friction_sensitivity=sensitivity,
         friction_statement=friction_statement(problem, within, sensitivity),
-        predicted=_predicted(problem, middle, own, tau, rng),
+        predicted=_predicted(problem, middle, z, tau, rng),
         discrepancy=discrepancy,
-        error={name: float(np.median(every[f"error_{name}"])) for name in problem.quantities},
+        error=of_a_trial,
         paper=None,
         least_squares=fit,
         posterior=posterior,
         identifiability=report,
-        warnings=tuple(warnings),
+        warnings=(
+            *unusable,
+            *outlier_warnings(problem, fit.z),
+            *report.warnings,
+            *prior_warnings(problem, fit.z),
+            *friction_warnings(problem, fit.z, reading),
+            *friction_interval_warnings(problem),
+            *misfit_warnings(problem, discrepancy, fit),
+            *narrow_channel_warnings(problem, values),
+            *common_warnings(problem, friction),
+        ),
     )
-
-
-def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> list[Note]:
-    return [
-        *outlier_warnings(problem, fit.z),
-        *report.warnings,
-        *prior_warnings(problem, fit.z),
-        *friction_warnings(problem, fit.z, reading),
-        *friction_interval_warnings(problem),
-    ]
 
 
 def _limits(draws: Samples) -> tuple[Samples, Samples]:

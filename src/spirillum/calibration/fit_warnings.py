@@ -12,7 +12,7 @@ from spirillum.calibration.experiment import Experiment, Quantity
 from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
-from spirillum.calibration.parameters import Estimate, LogUniform, Uniform
+from spirillum.calibration.parameters import Estimate, Uniform
 from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.display import percent
 from spirillum.notes import Note
@@ -90,7 +90,7 @@ def edge_warnings(problem: Problem, draws: Samples) -> list[Note]:
 
     found = []
     for item, place in zip(problem.coordinates, draws.T, strict=True):
-        if not isinstance(item.prior, Uniform | LogUniform):
+        if not isinstance(item.prior, Uniform):
             continue
         share = ndtr(place)  # of the prior below a draw
         for end, value, near in (

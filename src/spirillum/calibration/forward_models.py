@@ -26,7 +26,7 @@ from spirillum.dynamics.trial import quick_run, trial_means
 from spirillum.dynamics.tube_options import InTube
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.library import TabledTube, tables_of
+from spirillum.fluid.tube.library import TabledTube, prepared_tables, tables_of
 from spirillum.fluid.tube.stages import StageName
 from spirillum.kernels.native import thread_count
 from spirillum.robot.batch import RobotBatch
@@ -36,7 +36,7 @@ from spirillum.swimming.band import band_poses
 from spirillum.swimming.drawn_resistance import Draws, TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import passing_tables, preparation_time, prepare_all, table_for
+from spirillum.swimming.preparation import checked_geometries, preparation_time, prepare_all, table_for
 
 if TYPE_CHECKING:
     from scipy.interpolate import RBFInterpolator
@@ -101,7 +101,11 @@ def _tables(
     if lacking and not prepare:
         otherwise = ", or model 'sbt', which leaves out the walls"
         raise without_tables(experiment, lacking, "model 'tube' asks a table", "straight", otherwise)
-    made = passing_tables(experiment.robots, progress=on_progress) if lacking else found
+    made = (
+        prepared_tables(checked_geometries(experiment.robots), stage="straight", workers=1, progress=on_progress)
+        if lacking
+        else found
+    )
     return TabledTube({table.key: table for table in made if table is not None})
 
 
@@ -183,14 +187,23 @@ def trial_surfaces(
     experiment: Experiment, ends: Ends, on_progress: Callable[[str, int, int], None], *, prepare: bool
 ) -> TrialSurfaces:
     """Make the trials of all robots and lay surfaces through them."""
-    _check_yaw_tables(experiment, on_progress, prepare=prepare)
+    known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
+    lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
+    if lacking and not prepare:
+        raise without_tables(experiment, lacking, "a trial asks a table with yawed poses", "yaw")
+    if lacking:
+        prepare_all(experiment.robots, stage="yaw", progress=on_progress)
     return surfaces_of(experiment.robots, ends, on_progress)
 
 
 def surfaces_of(robots: Sequence[Robot], ends: Ends, on_progress: Callable[[str, int, int], None]) -> TrialSurfaces:
     """Make the trials of robots with tables, and lay surfaces through them."""
+    from scipy.stats import qmc
+
     names, count = tuple(ends), _RUNS[len(ends)]
-    logs = _points(ends, count)
+    shares = qmc.Sobol(len(ends), rng=np.random.default_rng(1)).random(count)
+    low, high = (np.log([pair[end] for pair in ends.values()]) for end in (0, 1))
+    logs: Samples = low + (high - low) * shares
     surfaces, scales, errors = [], [], []
     for place, robot in enumerate(robots):
         seen = np.full((count, 3), np.nan)
@@ -211,26 +224,6 @@ def surfaces_of(robots: Sequence[Robot], ends: Ends, on_progress: Callable[[str,
         scales.append(scale)
         errors.append(_left_out(logs[known], seen[known] / scale))
     return TrialSurfaces(names, ends, tuple(surfaces), np.array(scales), float(np.max(errors)))
-
-
-def _check_yaw_tables(experiment: Experiment, on_progress: Callable[[str, int, int], None], *, prepare: bool) -> None:
-    """Make the tables that are not there, or refuse."""
-    known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
-    lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
-    if lacking and not prepare:
-        raise without_tables(experiment, lacking, "a trial asks a table with yawed poses", "yaw")
-    if lacking:
-        prepare_all(experiment.robots, stage="yaw", progress=on_progress)
-
-
-def _points(ends: Ends, count: int) -> Samples:
-    """Logarithms of the parameters at the trials, (trials, parameters)."""
-    from scipy.stats import qmc
-
-    shares = qmc.Sobol(len(ends), rng=np.random.default_rng(1)).random(count)
-    low, high = (np.log([pair[end] for pair in ends.values()]) for end in (0, 1))
-    found: Samples = low + (high - low) * shares
-    return found
 
 
 def _measured(robot: Robot, table: TubeTable, values: Mapping[str, float]) -> tuple[float, float, float]:

@@ -8,28 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.envelope import interval
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.model_options import CALIBRATED
 from spirillum.swimming.model_choice import AUTO, WALLED
-
-
-class Prior(Protocol):
-    """A prior as a map from a standard normal coordinate."""
-
-    def value(self, z: Samples) -> Samples:
-        """The parameter at a coordinate."""
-
-    def coordinate(self, value: float) -> float:
-        """The coordinate of a parameter's value."""
-
-    def words(self, unit: str) -> str:
-        """The prior in words."""
 
 
 @dataclass(frozen=True)
@@ -40,69 +28,53 @@ class LogNormal:
     spread: float
 
     def value(self, z: Samples) -> Samples:
-        """See `Prior.value`."""
+        """The parameter at a standard normal coordinate."""
         return self.median * np.exp(self.spread * np.clip(z, -30.0, 30.0))
 
     def coordinate(self, value: float) -> float:
-        """See `Prior.coordinate`."""
+        """The coordinate of a parameter's value."""
         return float(np.log(value / self.median) / self.spread)
 
     def words(self, unit: str) -> str:
-        """See `Prior.words`."""
+        """The prior in words."""
         low, high = (self.median * np.exp(sign * 1.96 * self.spread) for sign in (-1, 1))
         return f"log-normal, 95 % from {low:.3g} to {high:.3g} {unit}".rstrip()
 
 
 @dataclass(frozen=True)
-class LogUniform:
-    """A positive number whose logarithm is anywhere between two ends."""
-
-    low: float
-    high: float
-
-    def value(self, z: Samples) -> Samples:
-        """See `Prior.value`."""
-        from scipy.special import ndtr
-
-        found: Samples = self.low * (self.high / self.low) ** ndtr(z)
-        return found
-
-    def coordinate(self, value: float) -> float:
-        """See `Prior.coordinate`."""
-        from scipy.special import ndtri
-
-        share = np.log(value / self.low) / np.log(self.high / self.low)
-        return float(ndtri(np.clip(share, 1e-6, 1.0 - 1e-6)))
-
-    def words(self, unit: str) -> str:
-        """See `Prior.words`."""
-        return f"log-uniform from {self.low:.3g} to {self.high:.3g} {unit}".rstrip()
-
-
-@dataclass(frozen=True)
 class Uniform:
-    """A number anywhere between two ends."""
+    """A number that is anywhere between two ends, or a positive one whose logarithm is."""
 
     low: float
     high: float
+    in_logarithm: bool = False
 
     def value(self, z: Samples) -> Samples:
-        """See `Prior.value`."""
+        """The parameter at a standard normal coordinate."""
         from scipy.special import ndtr
 
-        found: Samples = self.low + (self.high - self.low) * ndtr(z)
-        return found
+        share: Samples = ndtr(z)
+        if self.in_logarithm:
+            return np.asarray(self.low * (self.high / self.low) ** share)
+        return self.low + (self.high - self.low) * share
 
     def coordinate(self, value: float) -> float:
-        """See `Prior.coordinate`."""
+        """The coordinate of a parameter's value."""
         from scipy.special import ndtri
 
         share = (value - self.low) / (self.high - self.low)
+        if self.in_logarithm:
+            share = np.log(value / self.low) / np.log(self.high / self.low)
         return float(ndtri(np.clip(share, 1e-6, 1.0 - 1e-6)))
 
     def words(self, unit: str) -> str:
-        """See `Prior.words`."""
-        return f"uniform from {self.low:.3g} to {self.high:.3g} {unit}".rstrip()
+        """The prior in words."""
+        kind = "log-uniform" if self.in_logarithm else "uniform"
+        return f"{kind} from {self.low:.3g} to {self.high:.3g} {unit}".rstrip()
+
+
+Prior = LogNormal | Uniform
+"""A prior as a map from a standard normal coordinate."""
 
 
 @dataclass(frozen=True)
@@ -111,135 +83,103 @@ class FitParameter:
 
     name: str
     meaning: str
-    unit: str
-    scope: Literal["channel", "all", "tail"]
-    """One value for each channel, one for all, or (friction only) one for each tail."""
-    models: tuple[str, ...]
-    """Models that have it."""
     reason: str
     """Why its prior is as it is."""
+    unit: str = ""
+    scope: Literal["channel", "all", "tail"] = "all"
+    """One value for each channel, one for all, or (friction only) one for each tail."""
+    models: tuple[str, ...] = tuple(SWIMMER_MODELS)
+    """Models that have it."""
     needs_motor: bool = False
     """Whether it acts on the motor's rate, so that the motor has to be predicted."""
 
 
-_ALL = tuple(SWIMMER_MODELS)
+_AS_MOTORS_SCATTER = "around the robot's own value, 95 % within 20 %, as small motors scatter"
+_AS_PUBLISHED_SETS = "published sets of coefficients differ by a factor of two"
 _LISTED = (
     FitParameter(
         "body_drag",
         "factor on the body's axial drag D_x, one for each channel (Table III)",
-        "",
-        "channel",
-        CALIBRATED,
         "a body in a tube drags as much as alone or several times more: from a third to fourteen times",
+        scope="channel",
+        models=CALIBRATED,
     ),
     FitParameter(
         "body_rotation",
         "factor on the body's rotational drag E_x, one for each channel (Table III)",
-        "",
-        "channel",
-        CALIBRATED,
         "walls raise it, and the paper found 0.6: from a seventh to seven times",
+        scope="channel",
+        models=CALIBRATED,
     ),
     FitParameter(
         "friction",
         "effective friction B_eff of eq. (18), one for each tail; from the observed motor rate",
-        "N m s/rad",
-        "tail",
-        _ALL,
         "none of its own: it follows from (17) and (18), and its uncertainty from the rates and the other parameters",
+        unit="N m s/rad",
+        scope="tail",
     ),
     FitParameter(
         "shared_friction",
         "effective friction B_eff, one for all tails",
-        "N m s/rad",
-        "all",
-        _ALL,
         "around the value that takes half of the motor's torque at the observed rates, a factor of 19 either way",
+        unit="N m s/rad",
         needs_motor=True,
     ),
     FitParameter(
-        "normal_factor",
-        "factor on RFT's coefficient across the wire, c_n",
-        "",
-        "all",
-        ("rft",),
-        "published sets of coefficients differ by a factor of two",
+        "normal_factor", "factor on RFT's coefficient across the wire, c_n", _AS_PUBLISHED_SETS, models=("rft",)
     ),
     FitParameter(
-        "tangential_factor",
-        "factor on RFT's coefficient along the wire, c_t",
-        "",
-        "all",
-        ("rft",),
-        "published sets of coefficients differ by a factor of two",
+        "tangential_factor", "factor on RFT's coefficient along the wire, c_t", _AS_PUBLISHED_SETS, models=("rft",)
     ),
     FitParameter(
         "wire_diameter",
         "diameter of the tail's wire",
-        "m",
-        "all",
-        CALIBRATED,
         "around the robot's own value, 95 % within 20 %: lacquer, winding and measurement",
+        unit="m",
+        models=CALIBRATED,
     ),
     FitParameter(
         "viscosity",
         "viscosity of the fluid",
-        "Pa s",
-        "all",
-        _ALL,
         "around the robot's own value, 95 % within 20 %: silicone oil changes by 2 % a kelvin",
+        unit="Pa s",
         needs_motor=True,
     ),
     FitParameter(
-        "torque_constant",
-        "the motor's torque constant K_m",
-        "N m/A",
-        "all",
-        _ALL,
-        "around the robot's own value, 95 % within 20 %, as small motors scatter",
-        needs_motor=True,
+        "torque_constant", "the motor's torque constant K_m", _AS_MOTORS_SCATTER, unit="N m/A", needs_motor=True
     ),
     FitParameter(
-        "back_emf_constant",
-        "the motor's back-emf constant K_b",
-        "V s/rad",
-        "all",
-        _ALL,
-        "around the robot's own value, 95 % within 20 %, as small motors scatter",
-        needs_motor=True,
+        "back_emf_constant", "the motor's back-emf constant K_b", _AS_MOTORS_SCATTER, unit="V s/rad", needs_motor=True
     ),
     FitParameter(
         "gap",
         "gap under the body, one for each channel",
-        "m",
-        "channel",
-        ("tube",),
         "anywhere in the band of `predict`, from a ninetieth to a ninth of the body's radius",
+        unit="m",
+        scope="channel",
+        models=("tube",),
     ),
     FitParameter(
         "pitch",
         "angle by which the nose is raised, one for each channel",
-        "rad",
-        "channel",
-        ("tube",),
         "anywhere from level to the steepest that every tail of the channel allows",
+        unit="rad",
+        scope="channel",
+        models=("tube",),
     ),
     FitParameter(
         "roughness",
         "height of the asperities on which the robot rests, which decides its gap, one for all channels",
-        "m",
-        "all",
-        ("tube",),
         "from polished surfaces to burrs and seams, 1e-4 to 1e-2 of the body's radius",
+        unit="m",
+        models=("tube",),
     ),
     FitParameter(
         "friction_coefficient",
         "coefficient of dry friction where the asperities carry the robot's weight",
-        "",
-        "all",
-        ("tube",),
         "around 0.1, 95 % from 0.02 to 0.5: between asperities with a lubricant 0.05 to 0.15, dry more (Bowden and "
         "Tabor, The Friction and Lubrication of Solids, 1950)",
+        models=("tube",),
     ),
 )
 PARAMETERS: dict[str, FitParameter] = {parameter.name: parameter for parameter in _LISTED}
@@ -403,3 +343,8 @@ class Estimate:
     value: float
     low: float
     high: float
+
+    @property
+    def interval(self) -> dict[str, Any]:
+        """Its interval in JSON."""
+        return interval(self.low, self.high, LEVEL)

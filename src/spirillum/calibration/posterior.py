@@ -128,7 +128,7 @@ def sampled(
 
 def _starts(density: Density, fit: LeastSquares, walkers: int, rng: np.random.Generator) -> Samples:
     """Walkers around the least squares, twice as far apart as its errors; nuisances around what it found."""
-    from scipy.special import ndtri
+    from scipy.special import erf, ndtri
 
     count = fit.z.size
     spread = np.sqrt(np.clip(np.diag(fit.covariance), 1e-8, 1.0))
@@ -140,16 +140,10 @@ def _starts(density: Density, fit: LeastSquares, walkers: int, rng: np.random.Ge
         guesses = ((0, fit.discrepancy[name], DISCREPANCY_SCALE), (len(names), fit.error[name], ERROR_SCALE))
         for offset, value, scale in guesses:
             size = value if np.isfinite(value) and value > 0 else 0.02
-            share = _half_normal_share(max(size, 0.003) / scale)
+            share = float(np.clip(erf((max(size, 0.003) / scale) / np.sqrt(2.0)), 1e-9, 1.0 - 1e-9))
             centre[count + offset + n] = float(np.clip(ndtri(share), -3.0, 3.0))
     found: Samples = np.clip(centre + width * rng.normal(size=(walkers, density.size)), -6.0, 6.0)
     return found
-
-
-def _half_normal_share(value: float) -> float:
-    from scipy.special import erf
-
-    return float(np.clip(erf(value / np.sqrt(2.0)), 1e-9, 1.0 - 1e-9))
 
 
 class _Ensemble:

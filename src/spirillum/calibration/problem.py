@@ -25,7 +25,7 @@ from spirillum.calibration.parameters import (
     Coordinate,
     FitParameter,
     LogNormal,
-    LogUniform,
+    Prior,
     Uniform,
 )
 from spirillum.errors import InputError
@@ -244,17 +244,12 @@ def posed(
     problem = replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
     if answer == HELD:
         return problem
-    trials = trial_surfaces(experiment, _ends(problem), on_progress, prepare=prepare)
-    return replace(problem, trials=trials, interpolation_error=max(error, trials.error))
-
-
-def _ends(problem: Problem) -> dict[str, tuple[float, float]]:
-    """Values of each free parameter within which nearly all of its prior lies."""
     found = {}
     for item in problem.coordinates:
         low, high = (float(item.prior.value(np.array([end]))[0]) for end in (-_REACH, _REACH))
         found[item.parameter.name] = (low, high)
-    return found
+    trials = trial_surfaces(experiment, found, on_progress, prepare=prepare)
+    return replace(problem, trials=trials, interpolation_error=max(error, trials.error))
 
 
 def _with_assumed(free: Sequence[str], assumed: Mapping[str, float]) -> tuple[str, ...]:
@@ -341,20 +336,23 @@ def _coordinates(problem: Problem, parameter: FitParameter, batch: RobotBatch, r
     return [Coordinate(parameter, place, name, prior) for place, name in enumerate(names)]
 
 
-def _prior(
-    problem: Problem, parameter: FitParameter, batch: RobotBatch, ranges: Ranges
-) -> LogNormal | LogUniform | Uniform:
+def _prior(problem: Problem, parameter: FitParameter, batch: RobotBatch, ranges: Ranges) -> Prior:
     name = parameter.name
     if name in _LOG_NORMAL:
         return LogNormal(*_LOG_NORMAL[name])
     if name in ("normal_factor", "tangential_factor"):
         return LogNormal(float(getattr(batch.options.rft, name)), _COEFFICIENT_SPREAD)
     if name in ("gap", "roughness"):
-        return LogUniform(*ranges[name])
+        return Uniform(*ranges[name], in_logarithm=True)
     if name == "pitch":
         return Uniform(*ranges[name])
     if name == "shared_friction":
-        return LogNormal(_middle_friction(problem), _FRICTION_SPREAD)
+        ratio = problem.experiment.motor_rate
+        middle = problem.draws(problem.start[None])
+        found = problem.forward.predict(middle)
+        with_load = problem.forward.friction(middle, ratio.mean)[0]
+        all_of_it = with_load + found.load[0] / (1.0 - found.turning[0])
+        return LogNormal(float(0.5 * np.median(all_of_it[ratio.seen])), _FRICTION_SPREAD)
     source = batch if name in ("viscosity", "wire_diameter") else batch.electrics
     spread = stated_spread(problem.assumed[name]) if name in problem.assumed else _TOLERANCE_SPREAD
     return LogNormal(float(getattr(source, name)[0]), spread)
@@ -363,13 +361,3 @@ def _prior(
 def stated_spread(uncertainty: float) -> float:
     """Standard deviation of the logarithm of a number, given half of its relative 95 % interval."""
     return float(np.log1p(uncertainty) / 1.96)
-
-
-def _middle_friction(problem: Problem) -> float:
-    """B_eff that takes half of the motor's torque at the observed rates, N m s/rad."""
-    ratio = problem.experiment.motor_rate
-    middle = problem.draws(problem.start[None])
-    found = problem.forward.predict(middle)
-    with_load = problem.forward.friction(middle, ratio.mean)[0]
-    all_of_it = with_load + found.load[0] / (1.0 - found.turning[0])
-    return float(0.5 * np.median(all_of_it[ratio.seen]))

@@ -173,11 +173,16 @@ def suggest(
         raise InputError(f"no candidate can be built and answered: {left_out[0]}")
     if len(left_out) > _SAID:
         left_out[_SAID:] = [Note("without-answer", f"{len(left_out) - _SAID} more candidates are left out")]
+    ordered = sorted(found, key=lambda pair: -pair[0].gain)
+    best, of_best = ordered[0]
     return Suggestion(
         known,
         trials,
         answer,
-        _ranked(found),
+        tuple(
+            replace(item, behind=best.gain - item.gain, behind_error=_jackknife(of_best - gains))
+            for item, gains in ordered
+        ),
         (
             *((PAPER_ROBOTS_TAKEN,) if robots is None else ()),
             *_cautions(known, loaded),
@@ -284,16 +289,6 @@ def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
             several = values.shape[1] > 1
             names.append(f"{name}[{known.channels[place] * 1e3:g} mm]" if several else name)
     return np.stack(columns, axis=1), names
-
-
-def _ranked(found: Sequence[tuple[CandidateRobot, Samples]]) -> tuple[CandidateRobot, ...]:
-    """Candidates from the most to the least informative, each with how far it is behind the first."""
-    ordered = sorted(found, key=lambda pair: -pair[0].gain)
-    best, of_best = ordered[0]
-    return tuple(
-        replace(item, behind=best.gain - item.gain, behind_error=_jackknife(of_best - left_out))
-        for item, left_out in ordered
-    )
 
 
 def _jackknife(left_out: Samples) -> float:

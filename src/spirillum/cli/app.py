@@ -179,8 +179,8 @@ def study(
     """
     from spirillum.cli import renderer
 
-    if store is not None:
-        refuse_conflicts(context, "store", rows=rows)
+    drawn = request.typed.get("figures", True)
+    refuse_conflicts(context, *(["store"] if store else []), *([] if drawn else ["no figures"]), rows=rows)
     with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study_answer
         from spirillum.results.study_store import store_answer

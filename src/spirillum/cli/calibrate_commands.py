@@ -69,6 +69,8 @@ def calibrate(
     robots = [loaded_robot(name, settings) for name in robot]
     released = typed.get("answer") == RELEASED
     check_not_set(set_fields(overrides_from(settings)), typed.get("free"), typed.get("model", AUTO), released=released)
+    if not typed.get("figures", True):
+        refuse_conflicts(context, "no figures")
     if (method := typed.get("method", "posterior")) in METHODS and method != "posterior":
         refuse_conflicts(context, "no posterior", method=method)
     with renderer.progress_bar(quiet=json) as progress:

@@ -54,7 +54,8 @@ def measure(
     if setup is None:
         raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
     overrides = overrides_from(settings)
-    refuse_conflicts(context, "feasibility" if feasibility else "no feasibility")
+    drawn = request.typed.get("figures", True)
+    refuse_conflicts(context, "feasibility" if feasibility else "no feasibility", *([] if drawn else ["no figures"]))
     expected = request.take("feasibility")
     if feasibility:
         from spirillum.measurement.feasibility import feasibility as verdict

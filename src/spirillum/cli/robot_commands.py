@@ -63,13 +63,16 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     Example: `spirillum robot check biorob2012-wide`
     """
     from spirillum.cli import renderer
-    from spirillum.robot.load import check_answer, checked
+    from spirillum.envelope import envelope
+    from spirillum.robot.load import checked
     from spirillum.swimming.model_choice import models_without_answer
 
     problems, warnings = checked(robot, overrides_from(settings))
     if not problems:
         warnings = (*warnings, *models_without_answer(loaded_robot(robot, settings)))
-    renderer.show(check_answer(robot, problems, warnings), json=json)
+    renderer.show(
+        envelope("check", {"robot": robot, "valid": not problems, "problems": list(problems)}, warnings), json=json
+    )
     if problems:
         raise typer.Exit(1)
 

@@ -14,7 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.designs.search import ConfirmedDesign
 from spirillum.display import DisplayMixin, percent
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, interval, quantity
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.limits import broken
@@ -183,7 +183,7 @@ class Design(DisplayMixin):
                     "objective": quantity(other.objective, unit),
                     "keeps_conditions": other.keeps,
                     "probability_that_the_design_is_better": quantity(
-                        other.beaten, "1", low=other.beaten_low, high=other.beaten_high, kind="interval", level=LEVEL
+                        other.beaten, "1", **interval(other.beaten_low, other.beaten_high, LEVEL)
                     ),
                 }
                 for other in self.alternatives
@@ -225,15 +225,13 @@ class Design(DisplayMixin):
 
     def _ends(self, name: str) -> dict[str, Any]:
         known = self.uncertainty
-        if known is None or not np.isfinite(known.low.get(name, np.nan)):
-            return {}
-        return {"low": known.low[name], "high": known.high[name], "kind": "interval", "level": LEVEL}
+        return {} if known is None or name not in known.low else interval(known.low[name], known.high[name], LEVEL)
 
     def _uncertainty(self, known: Uncertainty) -> dict[str, Any]:
         found: dict[str, Any] = {"draws": known.draws, "deciding": dict(known.deciding)}
         if known.probability is not None:
             share, low, high = known.probability
-            found["probability"] = quantity(share, "1", low=low, high=high, kind="interval", level=LEVEL)
+            found["probability"] = quantity(share, "1", **interval(low, high, LEVEL))
         return found
 
 

@@ -98,7 +98,7 @@ def best_design(
         if above is not None:
             over = scores.cost[above[0]] - above[1]
             scale = abs(above[1]) or 1.0
-            found = np.where(over > 0, np.maximum(found, _over(over / scale)), found)
+            found = np.where(over > 0, np.maximum(found, np.minimum(BROKEN + (over / scale), 0.5 * REFUSED)), found)
         return np.asarray(found)
 
     def vectorised(columns: Samples) -> Samples:
@@ -153,11 +153,6 @@ def best_design(
     return Found(best, cost, bool(np.isfinite(final.values[objective, 0])))
 
 
-def _over(excess: Samples) -> Samples:
-    """Cost of a design that is beyond the bound of another objective: worse than those within, better than refused."""
-    return np.minimum(BROKEN + excess, 0.5 * REFUSED)
-
-
 def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points: int, on_progress: Progress) -> Samples:
     """Designs of which none is better in both objectives, (points, variables), from one extreme to the other.
 
@@ -173,24 +168,19 @@ def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points:
     for number in range(1, points - 1):
         on_progress("designs on the front", number, points)
         bound = float(costs[0] + (costs[1] - costs[0]) * number / (points - 1))
-        start = _nearest(evaluation, archive, bound)
+        shares, values = archive.all()
+        signs = [1.0 if item.target is not None else item.sign for item in evaluation.objectives]
+        keeps = np.flatnonzero(-signs[1] * values[1] <= bound)
+        members = max(_FEWEST, _POPULATION * evaluation.space.size)
+        rng = np.random.default_rng(len(shares))
+        best = keeps[np.argsort(-signs[0] * values[0, keeps], kind="stable")][: members // 2]
+        anywhere = rng.random((members - len(best), evaluation.space.size))
+        start = np.concatenate([shares[best], anywhere])
         one = best_design(evaluation, archive, seed=seed + number, above=(1, bound), start=start)
         found.append(one.shares)
     found.append(ends[1].shares)
     on_progress("designs on the front", points, points)
     return _undominated(evaluation, np.stack(found))
-
-
-def _nearest(evaluation: Evaluation, archive: Archive, bound: float) -> Samples:
-    """Designs to begin with: the best that are known to keep the bound, and some anywhere."""
-    shares, values = archive.all()
-    signs = [1.0 if item.target is not None else item.sign for item in evaluation.objectives]
-    keeps = np.flatnonzero(-signs[1] * values[1] <= bound)
-    members = max(_FEWEST, _POPULATION * evaluation.space.size)
-    rng = np.random.default_rng(len(shares))
-    best = keeps[np.argsort(-signs[0] * values[0, keeps], kind="stable")][: members // 2]
-    anywhere = rng.random((members - len(best), evaluation.space.size))
-    return np.concatenate([shares[best], anywhere])
 
 
 def _undominated(evaluation: Evaluation, shares: Samples) -> Samples:

@@ -52,21 +52,16 @@ def checked_ranges(axial: AxialRobot, ranges: Mapping[str, Any] | None) -> dict[
             raise InputError(f"ranges.{name} = {str(given)[:60]}; allowed: low and high, numbers, low first")
         found[name] = (float(pair[0]), float(pair[1]))
         for value in found[name]:
-            _check_value(robot, name, value)
+            if name in FACTORS:
+                if not 1.0 / _LARGEST_FACTOR <= value <= _LARGEST_FACTOR:
+                    raise InputError(
+                        f"ranges.{name} = {value:g}; allowed: factors above 0, from {1.0 / _LARGEST_FACTOR:g} to "
+                        f"{_LARGEST_FACTOR:g}"
+                    )
+            elif (kind := kind_of(robot, name)) is not None:
+                parse_option(f"ranges.{name}", value, kind)
     _check_corners(robot, found)
     return found
-
-
-def _check_value(robot: Robot, name: str, value: float) -> None:
-    """Refuse an end of a range that a robot file would not take."""
-    if name in FACTORS:
-        if not 1.0 / _LARGEST_FACTOR <= value <= _LARGEST_FACTOR:
-            raise InputError(
-                f"ranges.{name} = {value:g}; allowed: factors above 0, from {1.0 / _LARGEST_FACTOR:g} to "
-                f"{_LARGEST_FACTOR:g}"
-            )
-    elif (kind := kind_of(robot, name)) is not None:
-        parse_option(f"ranges.{name}", value, kind)
 
 
 def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> None:

@@ -64,16 +64,6 @@ class _ApartFromEachOther(Slender):
         return matrix[..., 0, 0], matrix[..., 0, 3], matrix[..., 3, 3]
 
 
-def effects_of(robot: Robot, answers: Mapping[str, Prediction], friction: str) -> tuple[Effect, ...]:
-    """Return the speed with one effect after the other, from Lighthill's theory to the trial.
-
-    Each step keeps all before it: body and wire resolved, each alone; the coupling; the flow between the parts; the
-    walls, held at the robot's pose; the pose of the trial, that is the lubrication film there; its yaw; contact, dry
-    friction and motion in time. Steps that the robot does not have, or that cannot be computed, are left out.
-    """
-    return tuple(_steps(robot, answers, friction))
-
-
 def _steps(robot: Robot, answers: Mapping[str, Prediction], friction: str) -> Iterator[Effect]:
     if LIGHTHILL not in answers or UNBOUNDED not in answers:
         return
@@ -187,7 +177,7 @@ class ModelComparison(DisplayMixin):
         """
         if any(answer.calibrated for answer in self.predictions.values()):
             return ()
-        return effects_of(self.robot, self.predictions, self.friction)
+        return tuple(_steps(self.robot, self.predictions, self.friction))
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum compare-models --json`."""
@@ -287,7 +277,13 @@ def compare_models(
     Raises:
         InputError: for wrong input, or if no model answers.
     """
-    names = _chosen(models)
+    requested = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
+    if not requested:
+        raise InputError(f"models = []; allowed: one or more of {', '.join(SWIMMER_MODELS)}")
+    names = [find_swimmer_model(name).name for name in requested]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(f"model '{twice[0]}' is named twice; allowed: each model once")
     own = with_resolution(load(robot), resolution, *names)
     factors = calibration is not None if calibrated is None else calibrated
     fit = read_fit(calibration)
@@ -332,18 +328,6 @@ def compare_models(
     if not predictions:
         raise InputError(*_nobody_answers(refusals))
     return ModelComparison(ready, reading, tuple(names), predictions, refusals)
-
-
-def _chosen(models: Sequence[str] | None) -> list[str]:
-    """Names of the models."""
-    requested = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
-    if not requested:
-        raise InputError(f"models = []; allowed: one or more of {', '.join(SWIMMER_MODELS)}")
-    names = [find_swimmer_model(name).name for name in requested]
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise InputError(f"model '{twice[0]}' is named twice; allowed: each model once")
-    return names
 
 
 def _nobody_answers(refusals: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:

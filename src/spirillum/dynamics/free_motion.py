@@ -112,7 +112,9 @@ def free_motion(
     """Follow a robot after release in its tube to its steady motion, or to the gap `until`; otherwise as `settle`."""
     placed, requested = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
-    _check(requested)
+    for item in field_values(requested):
+        if item.path in ("wait", "flow") and item.value is not None:
+            raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
     own = load(robot)
     contact = fit.contact()
     if fit.posterior is not None:
@@ -181,13 +183,6 @@ def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRob
     )
     links, start = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
     return held, _driven(links, held), start
-
-
-def _check(requested: InTube) -> None:
-    """Refuse what changes in time."""
-    for item in field_values(requested):
-        if item.path in ("wait", "flow") and item.value is not None:
-            raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
 
 
 def _check_until(until: float | None, gap: float) -> None:

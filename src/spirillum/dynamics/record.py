@@ -46,7 +46,13 @@ def dataset_of(
 
     rotation = _rotations(run.states)
     series = {**series_of(prediction, links, run), **more}
-    stored = _potential(links, run, rotation) + run.observed[:, rigid_links.PRESSED]
+    weight, phase = links.weight, run.states[:, rigid_links.PHASE]
+    cos, sin = np.cos(phase), np.sin(phase)
+    x, y, z = weight[rigid_links.MOMENT_ROTOR :]
+    rotor = np.stack([np.full_like(phase, x), cos * y - sin * z, sin * y + cos * z], axis=-1)
+    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[rigid_links.MOMENT_BODY : rigid_links.MOMENT_ROTOR] + rotor)
+    heavy = weight[rigid_links.WEIGHT_BODY] + weight[rigid_links.WEIGHT_ROTOR]
+    stored = np.asarray(heavy * run.states[:, rigid_links.POSITION + 2] + lift) + run.observed[:, rigid_links.PRESSED]
     series["potential_energy"] = stored
     attitude = run.states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
     attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
@@ -74,7 +80,15 @@ def dataset_of(
         },
         attrs=dict(attrs),
     )
-    return dataset.assign(_averages(dataset, on))
+    integrals = {
+        "mean_forward_velocity": (dataset["position"].values[:, 0], "m/s"),
+        "mean_tail_rotation_rate": (dataset["tail_angle"].values, "rad/s"),
+        "mean_body_rotation_rate": (dataset["body_angle"].values, "rad/s"),
+        "mean_drive_power": (dataset["drive_energy"].values, "W"),
+    }
+    if "electrical_energy" in dataset:
+        integrals["mean_electrical_power"] = (dataset["electrical_energy"].values, "W")
+    return dataset.assign(run_averages(dataset["time"].values, integrals, on, by_turn=True))
 
 
 def series_of(prediction: Prediction, links: FreeRobot, run: Trajectory) -> dict[str, Samples]:
@@ -84,7 +98,15 @@ def series_of(prediction: Prediction, links: FreeRobot, run: Trajectory) -> dict
     if prediction.batch.drive == "dc-motor":
         found |= _electrics(prediction, run)
     if prediction.batch.drive == "magnetic":
-        found |= _magnetics(links, run, rotation)
+        moment, rate = _in_field(links, rotation @ links.drive[_MOMENT]), links.drive[rigid_links.FIELD_RATE]
+        field = 0.5 * np.pi + _field_angle(links, run)
+        behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
+        behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
+        behind = np.where(run.duty > 0, behind, np.nan)
+        found |= {
+            "phase_lag": behind,
+            "wobble_angle": np.arccos(np.clip(np.abs(_in_field(links, rotation[:, :, 0])[:, 0]), 0.0, 1.0)),
+        }
     return found
 
 
@@ -199,43 +221,6 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
         "conversion_energy": states[:, rigid_links.CONVERSION],
         "battery_charge_used": states[:, rigid_links.CHARGE],
     }
-
-
-def _magnetics(links: FreeRobot, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
-    """Where the moment and the robot's axis point against the field."""
-    moment, rate = _in_field(links, rotation @ links.drive[_MOMENT]), links.drive[rigid_links.FIELD_RATE]
-    field = 0.5 * np.pi + _field_angle(links, run)
-    behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
-    behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
-    behind = np.where(run.duty > 0, behind, np.nan)
-    return {
-        "phase_lag": behind,
-        "wobble_angle": np.arccos(np.clip(np.abs(_in_field(links, rotation[:, :, 0])[:, 0]), 0.0, 1.0)),
-    }
-
-
-def _potential(links: FreeRobot, run: Trajectory, rotation: Samples) -> Samples:
-    """Energy of weight less buoyancy above the state at y = z = 0 and level, J."""
-    weight, phase = links.weight, run.states[:, rigid_links.PHASE]
-    cos, sin = np.cos(phase), np.sin(phase)
-    x, y, z = weight[rigid_links.MOMENT_ROTOR :]
-    rotor = np.stack([np.full_like(phase, x), cos * y - sin * z, sin * y + cos * z], axis=-1)
-    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[rigid_links.MOMENT_BODY : rigid_links.MOMENT_ROTOR] + rotor)
-    heavy = weight[rigid_links.WEIGHT_BODY] + weight[rigid_links.WEIGHT_ROTOR]
-    return np.asarray(heavy * run.states[:, rigid_links.POSITION + 2] + lift)
-
-
-def _averages(dataset: xr.Dataset, on: Sequence[DutyInterval]) -> dict[str, tuple[Any, ...]]:
-    """Averages of the run."""
-    integrals = {
-        "mean_forward_velocity": (dataset["position"].values[:, 0], "m/s"),
-        "mean_tail_rotation_rate": (dataset["tail_angle"].values, "rad/s"),
-        "mean_body_rotation_rate": (dataset["body_angle"].values, "rad/s"),
-        "mean_drive_power": (dataset["drive_energy"].values, "W"),
-    }
-    if "electrical_energy" in dataset:
-        integrals["mean_electrical_power"] = (dataset["electrical_energy"].values, "W")
-    return run_averages(dataset["time"].values, integrals, on, by_turn=True)
 
 
 def run_attributes(prediction: Prediction) -> dict[str, Any]:

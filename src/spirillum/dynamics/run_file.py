@@ -98,7 +98,10 @@ def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, A
         if info is None:
             found[name] = value
             continue
-        unit = _unit(info.annotation, info.metadata)
+        kinds = [item for item in info.metadata if isinstance(item, Kind)]
+        for part in get_args(info.annotation):
+            kinds += [item for item in getattr(part, "__metadata__", ()) if isinstance(item, Kind)]
+        unit = kinds[0].unit if kinds else None
         section = _section(info.annotation)
         if unit is not None and isinstance(value, float | int) and not isinstance(value, bool):
             found[name] = f"{value!r} {unit}"
@@ -117,13 +120,6 @@ def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, A
 
 _BY_NAME = ("calibration",)
 """Fields that hold sections by names of the user's."""
-
-
-def _unit(annotation: Any, metadata: list[Any]) -> str | None:
-    kinds = [item for item in metadata if isinstance(item, Kind)]
-    for part in get_args(annotation):
-        kinds += [item for item in getattr(part, "__metadata__", ()) if isinstance(item, Kind)]
-    return kinds[0].unit if kinds else None
 
 
 def _section(annotation: Any) -> type[BaseModel] | None:
@@ -219,19 +215,16 @@ class Poses:
         def between(values: Samples) -> Samples:
             return np.asarray(values[index] + share * (values[index + 1] - values[index]))
 
-        attitude = _turned(self.attitude[index], self.attitude[index + 1], share)
+        start = self.attitude[index]
+        end = self.attitude[index + 1]
+        cosine = float(np.clip(start @ end, -1.0, 1.0))
+        angle = np.arccos(cosine)
+        if angle < 1e-6:
+            mixed = (1.0 - share) * start + share * end
+        else:
+            mixed = (np.sin((1.0 - share) * angle) * start + np.sin(share * angle) * end) / np.sin(angle)
+        attitude = np.asarray(mixed / np.linalg.norm(mixed))
         return RobotPose(between(self.position), attitude, float(between(self.tail_phase)))
-
-
-def _turned(start: Samples, end: Samples, share: float) -> Samples:
-    """Part of the even turn from one quaternion to another."""
-    cosine = float(np.clip(start @ end, -1.0, 1.0))
-    angle = np.arccos(cosine)
-    if angle < 1e-6:
-        mixed = (1.0 - share) * start + share * end
-    else:
-        mixed = (np.sin((1.0 - share) * angle) * start + np.sin(share * angle) * end) / np.sin(angle)
-    return np.asarray(mixed / np.linalg.norm(mixed))
 
 
 def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:

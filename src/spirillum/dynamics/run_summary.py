@@ -11,7 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import END_OF_CHANNEL
 from spirillum.dynamics.timing import Switch
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, interval, quantity
 from spirillum.kernels.tube_motion import RANGE_LEFT
 from spirillum.notes import Note, notes_in
 from spirillum.quantities import attributes
@@ -43,24 +43,19 @@ _ENDS = (
 
 def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
     """Averages of a run, its final values, and what happened in it."""
-    last = dataset.isel(time=-1)
+    last, attrs = dataset.isel(time=-1), dataset.attrs
     content: dict[str, Any] = {
-        "robot": dataset.attrs["robot"],
-        "model": dataset.attrs["model"],
-        **({"model_reason": dataset.attrs["model_reason"]} if "model_reason" in dataset.attrs else {}),
-        "friction": dataset.attrs["friction"],
-        "motion": dataset.attrs["motion"],
+        **_given(attrs, "robot", "model", "model_reason", "friction", "motion"),
         "error_estimate": quantity(
-            float(dataset.attrs["error_estimate"]),
+            float(attrs["error_estimate"]),
             "1",
-            **({"against": dataset.attrs["error_against"]} if "error_against" in dataset.attrs else {}),
-            statement=dataset.attrs["known_error"],
+            **({"against": attrs["error_against"]} if "error_against" in attrs else {}),
+            statement=attrs["known_error"],
         ),
-        **({"placement": json.loads(dataset.attrs["placement"])} if "placement" in dataset.attrs else {}),
+        **({"placement": json.loads(attrs["placement"])} if "placement" in attrs else {}),
         **_in_the_tube(dataset),
-        "events": json.loads(dataset.attrs["events"]),
-        **({"state": dataset.attrs["state"]} if "state" in dataset.attrs else {}),
-        "steady": dataset.attrs["steady"],
+        "events": json.loads(attrs["events"]),
+        **_given(attrs, "state", "steady"),
         "duration": quantity(float(last["time"]), "s"),
     }
     if (begins := float(dataset["time"][0])) > 0.0:
@@ -81,19 +76,21 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
     return envelope("simulation", content, notes_in(dataset.attrs))
 
 
+def _given(attrs: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    """The attributes of these names that there are."""
+    return {name: attrs[name] for name in names if name in attrs}
+
+
 def _interval(dataset: xr.Dataset, name: str) -> dict[str, Any]:
     if f"{name}_low" not in dataset:
         return {}
-    low, high = float(dataset[f"{name}_low"]), float(dataset[f"{name}_high"])
-    return {"low": low, "high": high, "kind": "interval", "level": float(dataset.attrs["level"])}
+    return interval(float(dataset[f"{name}_low"]), float(dataset[f"{name}_high"]), float(dataset.attrs["level"]))
 
 
 def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:
     """Every quantity of a sweep as a list over the rates of the field."""
     content: dict[str, Any] = {
-        "robot": dataset.attrs["robot"],
-        "model": dataset.attrs["model"],
-        **({"model_reason": dataset.attrs["model_reason"]} if "model_reason" in dataset.attrs else {}),
+        **_given(dataset.attrs, "robot", "model", "model_reason"),
         "step_out_rate": quantity(float(dataset["step_out_rate"]), "rad/s"),
         "field_rate": quantity(dataset["field_rate"].values, "rad/s"),
     }
@@ -110,25 +107,18 @@ def _in_the_tube(dataset: xr.Dataset) -> dict[str, Any]:
     if "table" not in dataset.attrs:
         return {}
     attrs = dataset.attrs
-    return {
-        "in_tube": {
-            "ends": attrs["ends"],
-            "gap": quantity(float(dataset["wall_gap"][0]), "m", meaning="of the body, when the run begins"),
-            "roughness": quantity(float(attrs["roughness"]), "m"),
-            "friction_coefficient": quantity(float(attrs["friction_coefficient"]), "1"),
-            "wait": quantity(float(attrs["wait"]), "s"),
-        }
-        | _imposed_flow(dataset)
+    found = {
+        "ends": attrs["ends"],
+        "gap": quantity(float(dataset["wall_gap"][0]), "m", meaning="of the body, when the run begins"),
+        "roughness": quantity(float(attrs["roughness"]), "m"),
+        "friction_coefficient": quantity(float(attrs["friction_coefficient"]), "1"),
+        "wait": quantity(float(attrs["wait"]), "s"),
     }
-
-
-def _imposed_flow(dataset: xr.Dataset) -> dict[str, Any]:
-    """The mean velocity that is imposed on the fluid, over the run; nothing where ends are open or closed."""
-    if dataset.attrs["ends"] != "imposed flow":
-        return {}
-    time = dataset["time"].values
-    mean = float(dataset["mean_flow"].integrate("time")) / float(time[-1] - time[0])
-    return {"mean_flow": quantity(mean, "m/s", meaning="through the tube, over the run")}
+    if attrs["ends"] == "imposed flow":
+        time = dataset["time"].values
+        mean = float(dataset["mean_flow"].integrate("time")) / float(time[-1] - time[0])
+        found["mean_flow"] = quantity(mean, "m/s", meaning="through the tube, over the run")
+    return {"in_tube": found}
 
 
 _MOST_ALIKE = 4
@@ -216,9 +206,11 @@ def run_averages(
         for name, (values, unit) in integrals.items():
             words = f"{name.replace('_', ' ')}, {note}"
             source = "Section III of BioRob 2012" if not ending else "integrals of the run"
+            length = _length(over)
+            gained = sum(float(np.diff(np.interp(stretch, time, values))[0]) for stretch in over)
             found[name + ending] = (
                 (),
-                _average(time, values, over),
+                (gained / length if length > 0 else float("nan")),
                 {"units": unit, "long_name": words, "source": source},
             )
     found["time_on"] = ((), _length(stretches), attributes("time_on"))
@@ -228,12 +220,6 @@ def run_averages(
 
 def _length(stretches: Sequence[DutyInterval]) -> float:
     return float(sum(end - start for start, end in stretches))
-
-
-def _average(time: Samples, values: Samples, stretches: Sequence[DutyInterval]) -> float:
-    length = _length(stretches)
-    gained = sum(float(np.diff(np.interp(stretch, time, values))[0]) for stretch in stretches)
-    return gained / length if length > 0 else float("nan")
 
 
 def _steady_part(

@@ -170,7 +170,16 @@ def state_at_release(robot: Robot, links: TubeRobot, start: InitialPose) -> Samp
     if start.eccentricity is not None:
         state = state_at(start, start.eccentricity * (radius - a))
     else:
-        state = state_at(start, _offset(robot, start, GAP_SHARE * a if start.gap is None else start.gap, radius))
+        gap = GAP_SHARE * a if start.gap is None else start.gap
+        body = outlines_of(robot)["body"]
+        offset = TubePose.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset
+        if not offset >= -1e-12 * radius:
+            most = max(largest_gap(body, radius, start.pitch, start.yaw), 0.0)
+            raise InputError(
+                f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
+                f"{show(most, 'mm')}, or a smaller pitch or yaw"
+            )
+        state = state_at(start, max(offset, 0.0))
     gaps = links.gaps(state)
     if gaps.min() <= 0.0:
         name = links.names[int(np.argmin(gaps))]
@@ -216,16 +225,3 @@ def state_at(start: InitialPose, offset: float) -> Samples:
     state[rigid_links.POSITION + 1] = offset * np.sin(start.azimuth)
     state[rigid_links.POSITION + 2] = -offset * np.cos(start.azimuth)
     return state
-
-
-def _offset(robot: Robot, start: InitialPose, gap: float, radius: float) -> float:
-    """Offset at which the body's smallest gap is `gap`, m."""
-    body = outlines_of(robot)["body"]
-    offset = TubePose.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset
-    if not offset >= -1e-12 * radius:
-        most = max(largest_gap(body, radius, start.pitch, start.yaw), 0.0)
-        raise InputError(
-            f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
-            f"{show(most, 'mm')}, or a smaller pitch or yaw"
-        )
-    return max(offset, 0.0)

@@ -139,12 +139,6 @@ def _whole(value: Any) -> Any:
     return int(value)
 
 
-def _number_of_turns(value: Any) -> float:
-    if not is_number(value):
-        raise InputError(f"turns = {str(value)[:40]}; allowed: a number of turns")
-    return _float(value)
-
-
 def _float(value: float) -> float:
     """A number; infinity where it is too large for one, which the next check refuses."""
     try:
@@ -153,16 +147,21 @@ def _float(value: float) -> float:
         return math.inf
 
 
-def _length(value: Any) -> Any:
-    if not (value is None or isinstance(value, str) or is_number(value)):
-        raise InputError(f"duration = {str(value)[:40]}; allowed: a time, as in 2 s, or a float in s")
-    return _float(value) if is_number(value) else value
+def _of_kind(name: str, kinds: tuple[type, ...], allowed: str) -> BeforeValidator:
+    """A check that a value is a number where `float` is among its kinds, None where its type is, or of the others."""
+
+    def check(value: Any) -> Any:
+        if float in kinds and is_number(value):
+            return _float(value)
+        if not isinstance(value, tuple(kind for kind in kinds if kind is not float)):
+            raise InputError(f"{name} = {str(value)[:40]}; allowed: {allowed}")
+        return value
+
+    return BeforeValidator(check)
 
 
-def _duty_file(value: Any) -> Any:
-    if not (value is None or isinstance(value, (str, Path))):
-        raise InputError(f"duty = {str(value)[:40]}; allowed: a duty file; one number is drive.duty of the robot")
-    return value
+_DUTY = "a duty file; one number is drive.duty of the robot"
+_NONE = type(None)
 
 
 class Timetable(NamedTuple):
@@ -183,16 +182,18 @@ class Timing(Options):
 
     argument: ClassVar[str] = "timing"
 
-    turns: Annotated[float, BeforeValidator(_number_of_turns)] = 3.0
+    turns: Annotated[float, _of_kind("turns", (float,), "a number of turns")] = 3.0
     """Length of the run in turns of the tail, or of the field (the paper's three periods; free in a tube: 20 s)."""
-    duration: Annotated[str | float | None, BeforeValidator(_length)] = None
+    duration: Annotated[
+        str | float | None, _of_kind("duration", (_NONE, str, float), "a time, as in 2 s, or a float in s")
+    ] = None
     """Length of the run in time instead, with its unit (``"2 s"``) or a float in s."""
     samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100
     """Samples of the output per turn."""
     on: Annotated[Sequence[Window] | None, BeforeValidator(windows_of)] = None
     """Times (start, stop) between which the remote switches the drive on, with unit (``"2 s"``) or floats in s; None:
     on throughout."""
-    duty: Annotated[str | Path | None, BeforeValidator(_duty_file)] = None
+    duty: Annotated[str | Path | None, _of_kind("duty", (_NONE, str, Path), _DUTY)] = None
     """Duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next."""
 
     def check(self) -> None:

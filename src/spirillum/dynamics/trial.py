@@ -318,7 +318,9 @@ def with_interval(
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    swims = np.array([_swims(one) for one in runs])
+    swims = np.array(
+        [(not one.reason and one.basis["state"] != "standing" and one.values["forward_velocity"] > 0.0) for one in runs]
+    )
     basis: dict[str, Any] = {
         "runs": len(runs),
         "standing": sum(not one.reason for one in runs) - int(swims.sum()),
@@ -341,11 +343,6 @@ def with_interval(
         for name, (middle, low, high) in quantiles.items()
     }
     return replace(nominal, basis={**nominal.basis, **basis}, intervals=intervals)
-
-
-def _swims(run: ReleasedMotion) -> bool:
-    """Whether a robot moves forward, and dry friction does not hold it."""
-    return not run.reason and run.basis["state"] != "standing" and run.values["forward_velocity"] > 0.0
 
 
 def variance_shares(shares: Samples, values: Samples) -> Samples:

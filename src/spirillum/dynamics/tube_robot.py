@@ -137,15 +137,29 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     bound = robot.fluid.cavitation_pressure
     tube[kernel.CAVITATION] = np.inf if bound is None else bound
     names, sites = _sites(robot)
+    form = robot.tail.form
+    xi = _station_positions(robot)
+    line = centreline_of(robot, xi)
+    parts = (line.position, line.tangent * line.stretch[:, None])
+    rows = [
+        np.column_stack([xi, *(part @ turned.T for part in parts), np.full(xi.size, turn)])
+        for turn, turned in zip(form.turns, form.rotations, strict=True)
+    ]
+    tail = robot.tail
+    found = np.zeros(contacts.WIRE)
+    found[contacts.WIRE_RADIUS], found[contacts.AMPLITUDE] = 0.5 * tail.wire_diameter, tail.amplitude
+    found[contacts.TAPER] = 0.0 if tail.taper is None else tail.taper / tail.length
+    found[contacts.HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength if tail.form.is_helix else 0.0
+    found[contacts.ROOT], found[contacts.LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
     return TubeRobot(
         friction=friction_of(steady.batch, steady.friction, 0.0 if np.isnan(effective) else effective),
         weight=heavy,
         drive=drive,
         table=np.ascontiguousarray(table),
         tube=tube,
-        wire=_wire(robot),
+        wire=found,
         sites=sites,
-        stations=_stations(robot),
+        stations=np.ascontiguousarray(np.concatenate(rows)),
         flow=np.ascontiguousarray(around.flow, dtype=float),
         names=(*names, "tail"),
         length=half,
@@ -179,29 +193,6 @@ def _sites(robot: Robot) -> tuple[list[str], Samples]:
             (front - solid, 0.5 * coupling.diameter, 0.0, 0.0, 1.0),
         ]
     return names, np.array(rows)
-
-
-def _wire(robot: Robot) -> Samples:
-    tail = robot.tail
-    found = np.zeros(contacts.WIRE)
-    found[contacts.WIRE_RADIUS], found[contacts.AMPLITUDE] = 0.5 * tail.wire_diameter, tail.amplitude
-    found[contacts.TAPER] = 0.0 if tail.taper is None else tail.taper / tail.length
-    found[contacts.HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength if tail.form.is_helix else 0.0
-    found[contacts.ROOT], found[contacts.LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
-    return found
-
-
-def _stations(robot: Robot) -> Samples:
-    """Stations along the wires: of a helix of one size to find its crests, of any other the line itself."""
-    form = robot.tail.form
-    xi = _station_positions(robot)
-    line = centreline_of(robot, xi)
-    parts = (line.position, line.tangent * line.stretch[:, None])
-    rows = [
-        np.column_stack([xi, *(part @ turned.T for part in parts), np.full(xi.size, turn)])
-        for turn, turned in zip(form.turns, form.rotations, strict=True)
-    ]
-    return np.ascontiguousarray(np.concatenate(rows))
 
 
 def _station_positions(robot: Robot) -> Samples:

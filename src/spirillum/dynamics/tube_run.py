@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -96,9 +95,24 @@ def tube_run(
     notes += times.notes
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
     attrs = free_attributes(steady, robot, run, reach, title, notes)
-    attrs |= _assumptions(robot, wait, (*before, *run.events))
+    ordered = sorted((*before, *run.events), key=lambda event: event.time)
+    attrs |= {
+        "roughness": robot.roughness,
+        "friction_coefficient": float(robot.tube[kernel.COEFFICIENT]),
+        "sliding_speed": float(robot.tube[kernel.SLIDING]),
+        "ends": ENDS[float(robot.tube[kernel.ENDS])],
+        "wait": wait,
+        "events": json.dumps([{"time": event.time, "what": event.what} for event in ordered]),
+    }
     attrs["checkpoint"] = json.dumps(run.last._asdict())
-    dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
+    found = series_in_tube(run)
+    if not isinstance(start, InitialPose):
+        last = start.isel(time=-1)
+        begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
+        found["tail_angle"] = tail_angle_of(run.states, begun)
+        turns = np.round((float(start["azimuth"][-1]) - found["azimuth"][0]) / (2.0 * np.pi))
+        found["azimuth"] = found["azimuth"] + 2.0 * np.pi * turns
+    dataset = dataset_of(steady, robot, run, on, found, attrs)
     kept = np.isin(run.time, times.time) | (run.time == ended)
     return dataset if kept.all() else dataset.isel(time=kept)
 
@@ -148,18 +162,6 @@ def _near(dataset: xr.Dataset, time: float, state: Samples) -> bool:
     return bool(np.all(np.abs(state[rigid_links.POSITION : rigid_links.POSITION + 3] - there) <= way))
 
 
-def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Mapping[str, Any]:
-    ordered = sorted(events, key=lambda event: event.time)
-    return {
-        "roughness": robot.roughness,
-        "friction_coefficient": float(robot.tube[kernel.COEFFICIENT]),
-        "sliding_speed": float(robot.tube[kernel.SLIDING]),
-        "ends": ENDS[float(robot.tube[kernel.ENDS])],
-        "wait": wait,
-        "events": json.dumps([{"time": event.time, "what": event.what} for event in ordered]),
-    }
-
-
 def series_in_tube(run: Trajectory) -> dict[str, Samples]:
     """What a run in a tube has beside that of any free run, by name, each (n,); SI."""
     seen, states = run.observed, run.states
@@ -183,15 +185,3 @@ def series_in_tube(run: Trajectory) -> dict[str, Samples]:
         "mean_flow": seen[:, kernel.MEAN_FLOW],
         "flow_energy": states[:, rigid_links.FLOW],
     }
-
-
-def _in_the_tube(run: Trajectory, start: InitialPose | xr.Dataset) -> dict[str, Samples]:
-    """These, azimuth and tail angle counted on from the run that is continued."""
-    found = series_in_tube(run)
-    if not isinstance(start, InitialPose):
-        last = start.isel(time=-1)
-        begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
-        found["tail_angle"] = tail_angle_of(run.states, begun)
-        turns = np.round((float(start["azimuth"][-1]) - found["azimuth"][0]) / (2.0 * np.pi))
-        found["azimuth"] = found["azimuth"] + 2.0 * np.pi * turns
-    return found

@@ -118,7 +118,16 @@ class TubeFlowField(FluidField):
     @cached_property
     def _density(self) -> Amplitudes:
         """Modes (f_x, f_rho, g) ds/du of the tractions, even real, odd imaginary, (panels, p, modes, 3)."""
-        return _density(self.held.strengths, self._motion)
+        strengths = self.held.strengths
+        solids = strengths.solids
+        found = np.zeros((solids.modes, 3 * solids.panels.size), complex)
+        for rows, tractions, phase in zip(solids.rows, strengths.tractions, (1.0, 1j), strict=True):
+            values, starts = tractions @ self._motion, rows.starts
+            for m, here in enumerate(rows.of_mode):
+                found[m, here] += phase * values[starts[m] : starts[m + 1]]
+        shaped = found.reshape(solids.modes, *solids.panels.x.shape, 3)
+        density: Amplitudes = np.ascontiguousarray(np.moveaxis(shaped, 0, 2))
+        return density
 
     @cached_property
     def _wall(self) -> _Reflection:
@@ -130,18 +139,6 @@ class TubeFlowField(FluidField):
         layer = strengths.solids.panels, self._density
         add_tractions(turned, strengths.wires, self._forces, layer, field)
         return field
-
-
-def _density(strengths: Strengths, motion: Samples) -> Amplitudes:
-    solids = strengths.solids
-    found = np.zeros((solids.modes, 3 * solids.panels.size), complex)
-    for rows, tractions, phase in zip(solids.rows, strengths.tractions, (1.0, 1j), strict=True):
-        values, starts = tractions @ motion, rows.starts
-        for m, here in enumerate(rows.of_mode):
-            found[m, here] += phase * values[starts[m] : starts[m + 1]]
-    shaped = found.reshape(solids.modes, *solids.panels.x.shape, 3)
-    density: Amplitudes = np.ascontiguousarray(np.moveaxis(shaped, 0, 2))
-    return density
 
 
 class _Sources(NamedTuple):

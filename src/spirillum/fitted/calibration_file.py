@@ -27,7 +27,7 @@ from spirillum.robot.fields import (
 )
 from spirillum.robot.model_options import Calibration, known_model
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, with_numbers
 
 _WHAT = "a calibration file (TOML with [calibration.<model>] tables)"
 _SAME = 1e-6
@@ -262,28 +262,19 @@ def _is_of(robot: Robot, entry: FittedFriction) -> bool:
 
 
 _FIELDS = {
-    "wire_diameter": ("tail", "wire_diameter"),
-    "viscosity": ("fluid", "viscosity"),
-    "torque_constant": ("motor", "torque_constant"),
-    "back_emf_constant": ("motor", "back_emf_constant"),
-    "normal_factor": ("model", "rft", "normal_factor"),
-    "tangential_factor": ("model", "rft", "tangential_factor"),
-    "friction": ("friction", "effective"),
+    "wire_diameter": "tail.wire_diameter",
+    "viscosity": "fluid.viscosity",
+    "torque_constant": "motor.torque_constant",
+    "back_emf_constant": "motor.back_emf_constant",
+    "normal_factor": "model.rft.normal_factor",
+    "tangential_factor": "model.rft.tangential_factor",
+    "friction": "friction.effective",
 }
 """Field of `FittedValues` to the field of a robot."""
 
 
 def _with_fitted(robot: Robot, fitted: FittedValues) -> Robot:
-    for name, place in _FIELDS.items():
-        value = getattr(fitted, name)
-        if value is not None:
-            robot = _replaced(robot, place, value)
-    return robot
-
-
-def _replaced(section: Any, place: tuple[str, ...], value: float) -> Any:
-    """A frozen section with one field within it replaced; a part that the robot lacks stays away."""
-    below = getattr(section, place[0])
-    if len(place) == 1:
-        return section.model_copy(update={place[0]: value})
-    return section if below is None else section.model_copy(update={place[0]: _replaced(below, place[1:], value)})
+    """The robot with fitted fields; a motor that it lacks stays away."""
+    values = {path: getattr(fitted, name) for name, path in _FIELDS.items() if getattr(fitted, name) is not None}
+    lacking = "motor." if robot.motor is None else " "
+    return with_numbers(robot, {path: value for path, value in values.items() if not path.startswith(lacking)})

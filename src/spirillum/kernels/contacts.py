@@ -34,25 +34,15 @@ def asperity_energy(gap: float, height: float, load: float) -> float:
 
 @native("normal", "point", "j")
 def ring_gap(
-    y: Float64[Array, "19"],
-    rotation: Float64[Array, "3 3"],
-    radius: float,
-    site: Float64[Array, "5"],
-    normal: Float64[Array, "3"],
-    point: Float64[Array, "3"],
-    j: Float64[Array, "7"],
+    y: Float64[Array, "19"],  # the state
+    rotation: Float64[Array, "3 3"],  # body axes to lab
+    radius: float,  # R of the tube
+    site: Float64[Array, "5"],  # row of sites
+    normal: Float64[Array, "3"],  # result, the wall's normal at the nearest point in body axes
+    point: Float64[Array, "3"],  # result, the touching point from the origin in body axes, m
+    j: Float64[Array, "7"],  # result, (7,): the gap closes at j.q at the rates q
 ) -> float:
-    """Return the gap between the wall and one site, m.
-
-    Args:
-        y: the state.
-        rotation: body axes to lab.
-        radius: R of the tube.
-        site: row of sites.
-        normal: result, the wall's normal at the nearest point in body axes (3,).
-        point: result, the touching point from the origin in body axes, m (3,).
-        j: result, (7,): the gap closes at j.q at the rates q.
-    """
+    """Return the gap between the wall and one site, m."""
 
 
 @native("normal", "point", "j")
@@ -76,51 +66,28 @@ def crest(
 
 @native("force")
 def crest_film(
-    y: Float64[Array, "19"],
+    y: Float64[Array, "19"],  # state, as of `ring_gap`
     rotation: Float64[Array, "3 3"],
     radius: float,
-    wire: Float64[Array, "6"],
-    stations: Float64[Array, "count 8"],
-    bracket: Float64[Array, "3"],
-    viscosity: float,
-    bound: float,
-    rates: Float64[Array, "7"],
-    force: Float64[Array, "7"],
+    wire: Float64[Array, "6"],  # columns of the wire
+    stations: Float64[Array, "count 8"],  # all those of one wire
+    bracket: Float64[Array, "3"],  # as of `crest`
+    viscosity: float,  # Pa s
+    bound: float,  # p_c, Pa
+    rates: Float64[Array, "7"],  # q
+    force: Float64[Array, "7"],  # result against the rates, N and N m
 ) -> float:
-    """Return the gap as `crest` does, and write the forces of the lubrication film there.
-
-    Args:
-        y: state, as of `ring_gap`.
-        rotation: likewise.
-        radius: likewise.
-        wire: columns of the wire.
-        stations: all those of one wire.
-        bracket: as of `crest`.
-        viscosity: Pa s.
-        bound: p_c, Pa.
-        rates: q.
-        force: result against the rates, N and N m.
-    """
+    """Return the gap as `crest` does, and write the forces of the lubrication film there."""
 
 
 @native("q", "left")
 def balanced(
-    a: Float64[Array, "7 7"],
-    force: Float64[Array, "7"],
-    loads: Float64[Array, "count"],
-    rows: Float64[Array, "count 2 7"],
-    slow: float,
-    q: Float64[Array, "7"],
-    left: Float64[Array, "7"],
+    a: Float64[Array, "7 7"],  # A
+    force: Float64[Array, "7"],  # f
+    loads: Float64[Array, "count"],  # mu_c N_c, at most 32
+    rows: Float64[Array, "count 2 7"],  # J_c, sliding velocities along the tube and around it per rate
+    slow: float,  # v_r, m/s
+    q: Float64[Array, "7"],  # first guess, and the result
+    left: Float64[Array, "7"],  # result, what is left of the forces
 ) -> float:
-    """Find the rates q at which A q and dry friction balance the force; return what is left of the forces, over them.
-
-    Args:
-        a: A.
-        force: f.
-        loads: mu_c N_c, at most 32.
-        rows: J_c, sliding velocities along the tube and around it per rate.
-        slow: v_r, m/s.
-        q: first guess, and the result.
-        left: result, what is left of the forces.
-    """
+    """Find the rates q at which A q and dry friction balance the force; return the rest of the forces, over them."""

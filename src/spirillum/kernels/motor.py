@@ -11,14 +11,13 @@ MOST_POINTS = 12
 
 
 @native("out")
-def steady_currents(cases: Float64[Array, "count 15"], out: Float64[Array, "count"]) -> None:
-    """Fill the steady root of (17), A.
-
-    Args:
-        cases: motors under loads, (n, `LOADED`).
-        out: to be filled, (n,): negative where the load drives the motor, NaN where it does so beyond any root, or
-            beyond what the battery's voltage allows.
-    """
+def steady_currents(
+    cases: Float64[Array, "count 15"],  # motors under loads, (n, `LOADED`)
+    # to be filled, (n,): negative where the load drives the motor, NaN where it does so beyond any root, or beyond what
+    # the battery's voltage allows
+    out: Float64[Array, "count"],
+) -> None:
+    """Fill the steady root of (17), A."""
 
 
 @native("out")
@@ -30,21 +29,13 @@ def windings(
 
 @native("out")
 def curve_torques(
-    curve: Float64[Array, "25"],
-    coasting: Float64[Array, "count"],
-    per_torque: Float64[Array, "count"],
-    duty: float,
+    curve: Float64[Array, "25"],  # number of points, then rate, rad/s, and torque, N m, of each; of 25 numbers
+    coasting: Float64[Array, "count"],  # rate of the joint without a torque, rad/s
+    per_torque: Float64[Array, "count"],  # what a torque adds to it, 1/(N m s)
+    duty: float,  # 0 to 1; scales the torques
     out: Float64[Array, "count"],
 ) -> None:
-    """Fill the torques of a motor with a curve in its own sense, N m.
-
-    Args:
-        curve: number of points, then rate, rad/s, and torque, N m, of each; of 25 numbers.
-        coasting: rate of the joint without a torque, rad/s, (n,).
-        per_torque: what a torque adds to it, 1/(N m s), (n,).
-        duty: 0 to 1; scales the torques.
-        out: to be filled, (n,).
-    """
+    """Fill the torques of a motor with a curve in its own sense, N m."""
 
 
 # Parameters of one robot, SI; torques and rates at the joint.
@@ -63,23 +54,14 @@ STATES = 7
 
 @native("states", symbol="advance_axial")
 def advance(
-    parameters: Float64[Array, "count 18"],
-    states: Float64[Array, "count 7"],
-    dt: float,
-    duty: Float64[Array, "count"],
-    flow: Float64[Array, "count"],
-    fineness: float = 1.0,
+    parameters: Float64[Array, "count 18"],  # (n, `PARAMETERS`)
+    states: Float64[Array, "count 7"],  # (n, `STATES`), changed in place; NaN where duty, flow or parameters are none
+    dt: float,  # s, positive
+    duty: Float64[Array, "count"],  # 0 to 1
+    flow: Float64[Array, "count"],  # imposed mean flow, m/s
+    fineness: float = 1.0,  # number of pieces, relative to the normal one
 ) -> None:
-    """Take robots over a time, each at its own duty and flow.
-
-    Args:
-        parameters: (n, `PARAMETERS`).
-        states: (n, `STATES`), changed in place; NaN where duty, flow or parameters are none.
-        dt: s, positive.
-        duty: 0 to 1, (n,).
-        flow: imposed mean flow, m/s, (n,).
-        fineness: number of pieces, relative to the normal one.
-    """
+    """Take robots over a time, each at its own duty and flow."""
 
 
 @native("states")
@@ -104,20 +86,11 @@ def rates(parameters: Float64[Array, "18"], current: float, duty: float, flow: f
 
 @native("out")
 def contact_drag(
-    r: Float64[Array, "count 3 3"],
-    force: Float64[Array, "count"],
-    radius: Float64[Array, "count"],
-    rate: Float64[Array, "count"],
-    smooth: float,
+    r: Float64[Array, "count 3 3"],  # resistance of the whole robot against U, Omega and omega
+    force: Float64[Array, "count"],  # mu_c N, N
+    radius: Float64[Array, "count"],  # of the body, m
+    rate: Float64[Array, "count"],  # omega of the tail, rad/s
+    smooth: float,  # v_r over the speed of a body that turns as fast as its tail
     out: Float64[Array, "count"],
 ) -> None:
-    """Fill the drag k = force/s of dry friction at a contact that slides at s, N s/m, see `swimming.dry_friction`.
-
-    Args:
-        r: resistance of the whole robot against U, Omega and omega, (n, 3, 3).
-        force: mu_c N, N, (n,).
-        radius: of the body, m, (n,).
-        rate: omega of the tail, rad/s, (n,).
-        smooth: v_r over the speed of a body that turns as fast as its tail.
-        out: to be filled, (n,).
-    """
+    """Fill the drag k = force/s of dry friction at a contact that slides at s, N s/m, see `swimming.dry_friction`."""

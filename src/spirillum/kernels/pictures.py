@@ -21,202 +21,116 @@ def sampled(image: UInt8[Array, "h w 3"], pixels: Float64[Array, "k 2"], colours
 
 @native("work", "colours")
 def profile_of_rows(
-    image: UInt8[Array, "h w 3"],
-    first: Float64[Array, "n 2"],
-    last: Float64[Array, "n 2"],
-    work: Float64[Array, "3 samples"],
-    colours: Float64[Array, "n 3"],
+    image: UInt8[Array, "h w 3"],  # the picture
+    first: Float64[Array, "n 2"],  # start of each line, pixels
+    last: Float64[Array, "n 2"],  # end of each line, pixels
+    work: Float64[Array, "3 samples"],  # memory, for as many samples as a line has
+    colours: Float64[Array, "n 3"],  # the colours; NaN where fewer than half of the samples lie in the picture
 ) -> None:
-    """Interquartile mean of the colours on lines between pixels, which rejects highlights and bubbles.
-
-    Args:
-        image: the picture.
-        first: start of each line, pixels.
-        last: end of each line, pixels.
-        work: memory, for as many samples as a line has.
-        colours: the colours; NaN where fewer than half of the samples lie in the picture.
-    """
+    """Interquartile mean of the colours on lines between pixels, which rejects highlights and bubbles."""
 
 
 @native("colours")
 def stripes_at(
-    angles: Float64[Array, "n"],
-    blur: Float64[Array, "n"],
-    roll: float,
-    order: Int64[Array, "s"],
-    palette: Float64[Array, "classes 3"],
-    colours: Float64[Array, "n 3"],
+    angles: Float64[Array, "n"],  # angles about the axis, rad
+    blur: Float64[Array, "n"],  # standard deviation of the blur at each angle, rad
+    roll: float,  # angle of the first stripe's middle, rad
+    order: Int64[Array, "s"],  # class of each stripe
+    palette: Float64[Array, "classes 3"],  # colour of each class
+    colours: Float64[Array, "n 3"],  # the colours
 ) -> None:
-    """Colours of blurred stripes at angles about the axis, for the body's rotation angle `roll`.
-
-    Args:
-        angles: angles about the axis, rad.
-        blur: standard deviation of the blur at each angle, rad.
-        roll: angle of the first stripe's middle, rad.
-        order: class of each stripe.
-        palette: colour of each class.
-        colours: the colours.
-    """
+    """Colours of blurred stripes at angles about the axis, for the body's rotation angle `roll`."""
 
 
 @native("work", "losses", "answer")
 def stripe_fit(
-    profile: Float64[Array, "n 3"],
-    scale: Float64[Array, "n"],
-    trust: Float64[Array, "n"],
-    angles: Float64[Array, "n"],
-    shade: Float64[Array, "n 6"],
-    order: Int64[Array, "s"],
-    palette: Float64[Array, "classes 3"],
-    period: float,
-    tint: float,
-    cut: float,
-    usual: float,
-    blur: float,
+    profile: Float64[Array, "n 3"],  # colours along the angle; NaN where invisible
+    scale: Float64[Array, "n"],  # pixels per radian at each angle
+    trust: Float64[Array, "n"],  # weight of each angle, beside that of its scale
+    angles: Float64[Array, "n"],  # angles about the axis, rad
+    shade: Float64[Array, "n 6"],  # shading factor and additive sheen at each angle, in each channel
+    order: Int64[Array, "s"],  # class of each stripe
+    palette: Float64[Array, "classes 3"],  # colour of each class
+    period: float,  # of the pattern, rad
+    tint: float,  # strength of the prior on the channels' common gain
+    cut: float,  # residual beyond which a sample is an outlier
+    usual: float,  # least expected residual
+    blur: float,  # standard deviation of the blur, pixels
     work: Float64[Array, "n 17"],
-    losses: Float64[Array, "t"],
+    losses: Float64[Array, "t"],  # loss at each angle of the grid, 0 to 1
+    # angle, its standard error, loss, least loss at a distant angle, loss of a uniform colour, gains of the channels;
+    # unchanged where too little is visible
     answer: Float64[Array, "8"],
 ) -> None:
-    """Fit the rotation angle of stripes to a colour profile: grid search, then robust Gauss-Newton steps.
-
-    Args:
-        profile: colours along the angle; NaN where invisible.
-        scale: pixels per radian at each angle.
-        trust: weight of each angle, beside that of its scale.
-        angles: angles about the axis, rad.
-        shade: shading factor and additive sheen at each angle, in each channel.
-        order: class of each stripe.
-        palette: colour of each class.
-        period: of the pattern, rad.
-        tint: strength of the prior on the channels' common gain.
-        cut: residual beyond which a sample is an outlier.
-        usual: least expected residual.
-        blur: standard deviation of the blur, pixels.
-        work: memory.
-        losses: loss at each angle of the grid, 0 to 1.
-        answer: angle, its standard error, loss, least loss at a distant angle, loss of a uniform colour, gains of the
-            channels; unchanged where too little is visible.
-    """
+    """Fit the rotation angle of stripes to a colour profile: grid search, then robust Gauss-Newton steps."""
 
 
 @native("losses", "found")
 def stripe_edges(
-    levels: Float64[Array, "n 3"],
-    angles: Float64[Array, "n"],
-    blur: Float64[Array, "n"],
-    shade: Float64[Array, "n 6"],
-    colours: Float64[Array, "s 3"],
-    roll: float,
-    tried: Float64[Array, "t"],
-    step: float,
-    steepest: float,
-    around: float,
-    contrast: float,
-    fewest: int,
+    levels: Float64[Array, "n 3"],  # colours along the angle; NaN where nothing is seen
+    angles: Float64[Array, "n"],  # angles about the axis, ascending, rad
+    blur: Float64[Array, "n"],  # standard deviation of the blur at each angle, rad
+    shade: Float64[Array, "n 6"],  # shading factor and additive sheen at each angle, in each channel
+    colours: Float64[Array, "s 3"],  # of the stripes in their order
+    roll: float,  # angle of the first stripe's middle, rad
+    tried: Float64[Array, "t"],  # shifts that are tried, evenly spaced, rad
+    step: float,  # between them, rad
+    steepest: float,  # largest angle from the direction towards the camera at which an edge is located, rad
+    around: float,  # half width over that of a stripe of the surroundings
+    contrast: float,  # least distance of the colours on either side
+    fewest: int,  # fewest samples in the surroundings
     losses: Float64[Array, "t"],
-    found: Float64[Array, "s"],
+    found: Float64[Array, "s"],  # the shifts, rad; NaN of edges that are out of view
 ) -> None:
-    """Angles by which the edges between stripes lie beyond their even places, by least squares one by one.
-
-    Args:
-        levels: colours along the angle; NaN where nothing is seen.
-        angles: angles about the axis, ascending, rad.
-        blur: standard deviation of the blur at each angle, rad.
-        shade: shading factor and additive sheen at each angle, in each channel.
-        colours: of the stripes in their order.
-        roll: angle of the first stripe's middle, rad.
-        tried: shifts that are tried, evenly spaced, rad.
-        step: between them, rad.
-        steepest: largest angle from the direction towards the camera at which an edge is located, rad.
-        around: half width over that of a stripe of the surroundings.
-        contrast: least distance of the colours on either side.
-        fewest: fewest samples in the surroundings.
-        losses: memory.
-        found: the shifts, rad; NaN of edges that are out of view.
-    """
+    """Angles by which the edges between stripes lie beyond their even places, by least squares one by one."""
 
 
 @native("work", "ridge")
 def ridge_of(
-    image: UInt8[Array, "h w 3"],
-    middle: Float64[Array, "rows 2"],
-    across: Float64[Array, "rows 2"],
-    contrast: Float64[Array, "3"],
-    inner: int,
+    image: UInt8[Array, "h w 3"],  # the picture
+    middle: Float64[Array, "rows 2"],  # pixel of each row's middle
+    across: Float64[Array, "rows 2"],  # step from one column to the next, pixels
+    contrast: Float64[Array, "3"],  # weight of each channel
+    inner: int,  # half the width of the line, columns
     work: Float64[Array, "2 columns"],
-    ridge: Float64[Array, "rows columns"],
+    ridge: Float64[Array, "rows columns"],  # the strip; NaN in rows that leave the picture
 ) -> None:
-    """Ridge filter: contrast of a line at each pixel of a strip to both of its sides.
-
-    Args:
-        image: the picture.
-        middle: pixel of each row's middle.
-        across: step from one column to the next, pixels.
-        contrast: weight of each channel.
-        inner: half the width of the line, columns.
-        work: memory.
-        ridge: the strip; NaN in rows that leave the picture.
-    """
+    """Ridge filter: contrast of a line at each pixel of a strip to both of its sides."""
 
 
 @native("scores")
 def wave_scores(
-    ridge: Float64[Array, "rows columns"],
-    xi: Float64[Array, "rows"],
-    tilt: Float64[Array, "rows 3"],
-    wave: Float64[Array, "4"],
-    step: float,
-    every: int,
-    turns: Float64[Array, "phases 2"],
-    scores: Float64[Array, "phases"],
+    ridge: Float64[Array, "rows columns"],  # the strip
+    xi: Float64[Array, "rows"],  # distance from the root of each row, m
+    tilt: Float64[Array, "rows 3"],  # of each row
+    wave: Float64[Array, "4"],  # of the wire
+    step: float,  # width of a column, m
+    every: int,  # stride of the rows
+    turns: Float64[Array, "phases 2"],  # cosine and sine of the phases
+    scores: Float64[Array, "phases"],  # the score of each phase
 ) -> None:
-    """Mean ridge along the wire at evenly spaced phases; NaN with fewer than a third of the rows in the picture.
-
-    Args:
-        ridge: the strip.
-        xi: distance from the root of each row, m.
-        tilt: of each row.
-        wave: of the wire.
-        step: width of a column, m.
-        every: stride of the rows.
-        turns: cosine and sine of the phases.
-        scores: the score of each phase.
-    """
+    """Mean ridge along the wire at evenly spaced phases; NaN with fewer than a third of the rows in the picture."""
 
 
 @native("work", "answer")
 def wave_fit(
-    ridge: Float64[Array, "rows columns"],
-    xi: Float64[Array, "rows"],
-    tilt: Float64[Array, "rows 3"],
-    wave: Float64[Array, "4"],
-    phase: float,
-    step: float,
-    width: float,
-    usual: float,
-    likely_offset: float,
-    likely_lean: float,
+    ridge: Float64[Array, "rows columns"],  # the strip
+    xi: Float64[Array, "rows"],  # distance from the root of each row, m
+    tilt: Float64[Array, "rows 3"],  # of each row
+    wave: Float64[Array, "4"],  # of the wire
+    phase: float,  # to begin with, rad
+    step: float,  # width of a column, m
+    width: float,  # of the wire, m
+    usual: float,  # typical ridge on the wire
+    likely_offset: float,  # prior standard deviation of the offset, m
+    likely_lean: float,  # prior standard deviation of the difference of offsets from end to end, m
     work: Float64[Array, "rows 10"],
+    # phase, its standard error, inlier share of the rows, offset, tilt, numerator and denominator of the handedness (0
+    # as assumed, -2 opposite) and of the relative error of the amplitude, mean ridge; unchanged where too little is in
+    # view
     answer: Float64[Array, "10"],
 ) -> None:
-    """Robust Gauss-Newton fit of phase, lateral offset and tilt of a wire, from a phase nearby.
-
-    Args:
-        ridge: the strip.
-        xi: distance from the root of each row, m.
-        tilt: of each row.
-        wave: of the wire.
-        phase: to begin with, rad.
-        step: width of a column, m.
-        width: of the wire, m.
-        usual: typical ridge on the wire.
-        likely_offset: prior standard deviation of the offset, m.
-        likely_lean: prior standard deviation of the difference of offsets from end to end, m.
-        work: memory.
-        answer: phase, its standard error, inlier share of the rows, offset, tilt, numerator and denominator of the
-            handedness (0 as assumed, -2 opposite) and of the relative error of the amplitude, mean ridge; unchanged
-            where too little is in view.
-    """
+    """Robust Gauss-Newton fit of phase, lateral offset and tilt of a wire, from a phase nearby."""
 
 
 @native("pixels")

@@ -29,21 +29,14 @@ MEMORY = 5
 
 @native("dy", "data")
 def rates(
-    dy: Float64[Array, "19"],
-    time: float,
-    y: Float64[Array, "19"],
+    dy: Float64[Array, "19"],  # derivative of the state, the result
+    time: float,  # s
+    y: Float64[Array, "19"],  # the state, see the constants of `rigid_links`
+    # from `packed` of `tube_motion` or `two_links`; its rates are where the solution begins
     data: Float64[Array, "size"],
-    table: Float64[Array, "table_size"],
+    table: Float64[Array, "table_size"],  # the robot's table, (0,) for one without a tube
 ) -> None:
-    """Write the time derivative of a state into `dy`, and what is observed to the begin of `data`.
-
-    Args:
-        dy: derivative of the state, the result.
-        time: s.
-        y: the state, see the constants of `rigid_links`.
-        data: from `packed` of `tube_motion` or `two_links`; its rates are where the solution begins.
-        table: the robot's table, (0,) for one without a tube.
-    """
+    """Write the time derivative of a state into `dy`, and what is observed to the begin of `data`."""
 
 
 @native("data", "out")
@@ -96,45 +89,28 @@ def interpolate(
 
 @native("memory", "y", "before", "increments", "jacobian", "gaps", "states", "data")
 def advance(
-    stop: float,
-    clip: bool,  # noqa: FBT001 - an argument of C
-    steps: int,
-    tolerance: float,
-    memory: Float64[Array, "5"],
-    y: Float64[Array, "19"],
-    before: Float64[Array, "19"],
-    increments: Float64[Array, "8 19"],
+    stop: float,  # where to stop, s
+    clip: bool,  # noqa: FBT001 -- whether a step ends there; else the last one may go beyond
+    steps: int,  # number of steps at most
+    tolerance: float,  # error of a step over the sizes
+    memory: Float64[Array, "5"],  # time and step length, see the constants; changed
+    y: Float64[Array, "19"],  # the state, (19,); changed
+    before: Float64[Array, "19"],  # result, the state at the beginning of the last step
+    increments: Float64[Array, "8 19"],  # result, those of the last step
+    # result, derivatives of the rates of what acts (`ACTING`) at the beginning of the last step, 1/s
     jacobian: Float64[Array, "8 8"],
-    gaps: Float64[Array, "watched"],
-    samples: Float64[Array, "samples"],
-    states: Float64[Array, "samples 19"],
+    gaps: Float64[Array, "watched"],  # what is watched, at `y`; changed
+    samples: Float64[Array, "samples"],  # increasing times, s: those in the steps taken are answered
+    states: Float64[Array, "samples 19"],  # result, the states at the samples
+    # sizes of the state's components below which nothing matters, (19,); a small change of time, s (0: nothing depends
+    # on it); a time of the order of the run's, s
     sizes: Float64[Array, "21"],
-    limits: Float64[Array, "5"],
-    rough: float,
-    data: Float64[Array, "size"],
-    table: Float64[Array, "table_size"],
+    limits: Float64[Array, "5"],  # where tube and battery end
+    rough: float,  # height of the asperities, m
+    data: Float64[Array, "size"],  # from `packed` of `tube_motion` or `two_links`
+    table: Float64[Array, "table_size"],  # the robot's table, (0,) for one without walls
 ) -> int:
     """Step on until a time, an event, or the number of steps is reached.
-
-    Args:
-        stop: where to stop, s.
-        clip: whether a step ends there; else the last one may go beyond.
-        steps: number of steps at most.
-        tolerance: error of a step over the sizes.
-        memory: time and step length, see the constants; changed.
-        y: the state, (19,); changed.
-        before: result, the state at the beginning of the last step.
-        increments: result, those of the last step, (8, 19).
-        jacobian: result, derivatives of the rates of what acts (`ACTING`) at the beginning of the last step, 1/s.
-        gaps: what is watched, at `y`; changed.
-        samples: increasing times, s: those in the steps taken are answered.
-        states: result, the states at the samples, (n, 19).
-        sizes: sizes of the state's components below which nothing matters, (19,); a small change of time, s (0:
-            nothing depends on it); a time of the order of the run's, s.
-        limits: where tube and battery end.
-        rough: height of the asperities, m.
-        data: from `packed` of `tube_motion` or `two_links`.
-        table: the robot's table, (0,) for one without walls.
 
     Returns:
         One of `DONE`, `PAUSED`, `CROSSED`, `STUCK`.

@@ -29,44 +29,26 @@ def force_matrix(points: Float64[Array, "n 3"], e2: Float64[Array, " n"], matrix
 
 @native("velocities", "gradients")
 def moment_matrices(
-    points: Float64[Array, "n 3"],
-    e2: Float64[Array, " n"],
-    moments: Float64[Array, "n q 3 3"],
+    points: Float64[Array, "n 3"],  # m
+    e2: Float64[Array, " n"],  # square of the blob radius of each point
+    moments: Float64[Array, "n q 3 3"],  # trace-free tensors of the moments at each point, force by displacement
     velocities: Float64[Array, "n 3 n q"],
-    gradients: Float64[Array, "n q n q"],
+    gradients: Float64[Array, "n q n q"],  # of the velocities along the moments, symmetric; to be filled
 ) -> None:
-    """Fill in what unit first moments at points do.
-
-    Args:
-        points: m.
-        e2: square of the blob radius of each point.
-        moments: trace-free tensors of the moments at each point, force by displacement.
-        velocities: to be filled.
-        gradients: of the velocities along the moments, symmetric; to be filled.
-    """
+    """Fill in what unit first moments at points do."""
 
 
 @native("a", "b")
 def ring_integrals(
-    dx: float,
-    delta: float,
-    rho: float,
-    rho_s: float,
-    e2: float,
-    a: Float64[Array, " count"],
+    dx: float,  # axial distance of the rings
+    delta: float,  # rho - rho_s, known better than the difference where the rings are close
+    rho: float,  # radius of one ring, above 0
+    rho_s: float,  # radius of the other, above 0
+    e2: float,  # square of the blob radius; rings that coincide need one
+    a: Float64[Array, " count"],  # to be filled, at least 2
     b: Float64[Array, " count"],
 ) -> None:
-    """Fill a[n] = int cos(n phi)/r dphi and b[n] = int cos(n phi)/r^3 dphi.
-
-    Args:
-        dx: axial distance of the rings.
-        delta: rho - rho_s, known better than the difference where the rings are close.
-        rho: radius of one ring, above 0.
-        rho_s: radius of the other, above 0.
-        e2: square of the blob radius; rings that coincide need one.
-        a: to be filled, at least 2.
-        b: to be filled.
-    """
+    """Fill a[n] = int cos(n phi)/r dphi and b[n] = int cos(n phi)/r^3 dphi."""
 
 
 @native("blocks")
@@ -83,101 +65,69 @@ def ring_blocks(
 
 @native("blocks")
 def layer_blocks(
-    x: Float64[Array, " t"],
-    rho: Float64[Array, " t"],
-    own: Int64[Array, " t"],
-    x_p: Float64[Array, "panels p"],
-    rho_p: Float64[Array, "panels p"],
-    e2: float,
-    nodes: Float64[Array, " p"],
-    barycentric: Float64[Array, " p"],
-    fine: Float64[Array, " f"],
-    fine_weights: Float64[Array, " f"],
-    weights: Float64[Array, " p"],
+    x: Float64[Array, " t"],  # targets
+    rho: Float64[Array, " t"],  # targets
+    own: Int64[Array, " t"],  # index of the node that a target is, panel by panel; -1 for a target off the outline
+    x_p: Float64[Array, "panels p"],  # nodes of the panels
+    rho_p: Float64[Array, "panels p"],  # nodes of the panels
+    e2: float,  # square of the blob radius
+    nodes: Float64[Array, " p"],  # on [-1, 1]
+    barycentric: Float64[Array, " p"],  # weights of the nodes
+    fine: Float64[Array, " f"],  # abscissas of a finer Gauss rule, for panels near a target
+    fine_weights: Float64[Array, " f"],  # their weights
+    weights: Float64[Array, " p"],  # Gauss weights of the nodes
     blocks: Float64[Array, "modes t 3 panels p 3"],
 ) -> None:
     """Fill the velocities of every mode at rings, from a single layer on the panels of outlines.
 
     The density is interpolated between the panel's nodes and multiplied by the length of du, so that the integrals
     are over rho du.
-
-    Args:
-        x: targets.
-        rho: targets.
-        own: index of the node that a target is, panel by panel; -1 for a target off the outline.
-        x_p: nodes of the panels.
-        rho_p: nodes of the panels.
-        e2: square of the blob radius.
-        nodes: on [-1, 1].
-        barycentric: weights of the nodes.
-        fine: abscissas of a finer Gauss rule, for panels near a target.
-        fine_weights: their weights.
-        weights: Gauss weights of the nodes.
-        blocks: to be filled.
     """
 
 
 @native("out")
-def wave_extensions(k: float, radius: float, rho: Float64[Array, " n"], out: Float64[Array, "n orders 3 3"]) -> None:
-    """Fill in the velocities (X, u_rho, v) at rho for unit velocities at the radius.
-
-    Args:
-        k: wave number, above 0.
-        radius: of the cylinder on which the waves are one.
-        rho: where.
-        out: to be filled.
-    """
+def wave_extensions(
+    k: float,  # wave number, above 0
+    radius: float,  # of the cylinder on which the waves are one
+    rho: Float64[Array, " n"],  # where
+    out: Float64[Array, "n orders 3 3"],
+) -> None:
+    """Fill in the velocities (X, u_rho, v) at rho for unit velocities at the radius."""
 
 
 @native("layers")
-def wall_layers(z: float, first: float, layers: Float64[Array, "orders 3 3"]) -> None:
-    """Fill in the single layer S on a cylinder in unbounded fluid, in units of 4 pi R/(8 pi mu).
-
-    Args:
-        z: k times the radius R.
-        first: K_1(z)/K_0(z).
-        layers: velocities (X, u_rho, v) from densities (F, f_rho, g), symmetric; to be filled.
-    """
+def wall_layers(
+    z: float,  # k times the radius R
+    first: float,  # K_1(z)/K_0(z)
+    # velocities (X, u_rho, v) from densities (F, f_rho, g), symmetric; to be filled
+    layers: Float64[Array, "orders 3 3"],
+) -> None:
+    """Fill in the single layer S on a cylinder in unbounded fluid, in units of 4 pi R/(8 pi mu)."""
 
 
 @native("out")
 def circle_waves(
-    k: float,
-    radius: float,
-    reference: float,
-    offset: float,
-    theta: Float64[Array, " n"],
+    k: float,  # wave number, above 0
+    radius: float,  # of the tube
+    reference: float,  # radius of the cylinder about the second axis
+    offset: float,  # of the second axis below the tube's
+    theta: Float64[Array, " n"],  # angles about the second axis
+    # to be filled: even, odd; component; point; order; wall component. u_x comes times i
     out: Float64[Array, "2 3 n orders 3"],
 ) -> None:
-    """Velocities (x, rho, theta) of even and odd waves in cylindrical components about a second, parallel axis.
-
-    Args:
-        k: wave number, above 0.
-        radius: of the tube.
-        reference: radius of the cylinder about the second axis.
-        offset: of the second axis below the tube's.
-        theta: angles about the second axis.
-        out: to be filled: even, odd; component; point; order; wall component. u_x comes times i.
-    """
+    """Velocities (x, rho, theta) of even and odd waves in cylindrical components about a second, parallel axis."""
 
 
 @native("out")
 def point_waves(
-    k: float,
-    radius: float,
-    places: Float64[Array, "n 3"],
-    first: int,
+    k: float,  # wave number, above 0
+    radius: float,  # of the tube
+    places: Float64[Array, "n 3"],  # points about the tube's axis
+    first: int,  # the first order p
+    # to be filled: order; even, odd; real, imaginary part; wall component; point; component
     out: Float64[Array, "orders 2 2 3 n 3"],
 ) -> None:
-    """Velocities (x, y, z) of waves at points.
-
-    Args:
-        k: wave number, above 0.
-        radius: of the tube.
-        places: points about the tube's axis, in its axes.
-        first: the first order p.
-        out: to be filled: order; even, odd; real, imaginary part; wall component; point; component.
-    """
+    """Velocities (x, y, z) of waves at points."""
 
 
 @native("out")
@@ -193,25 +143,16 @@ def single_point_waves(
 
 @native("out")
 def ring_waves(
-    k: float,
-    radius: float,
-    places: Float64[Array, "n angles 3"],
-    theta: Float64[Array, " angles"],
-    rotation: Float64[Array, "3 3"],
-    first: int,
+    k: float,  # wave number, above 0
+    radius: float,  # of the tube
+    places: Float64[Array, "n angles 3"],  # points on the rings, about the tube's axis
+    theta: Float64[Array, " angles"],  # angles about the rings' axis
+    rotation: Float64[Array, "3 3"],  # from the rings' axes to the tube's
+    first: int,  # the first order p
+    # to be filled: even, odd; component; ring; order; real, imaginary part; wall component; angle
     out: Float64[Array, "2 3 n orders 2 3 angles"],
 ) -> None:
-    """Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
-
-    Args:
-        k: wave number, above 0.
-        radius: of the tube.
-        places: points on the rings, about the tube's axis.
-        theta: angles about the rings' axis.
-        rotation: from the rings' axes to the tube's.
-        first: the first order p.
-        out: to be filled: even, odd; component; ring; order; real, imaginary part; wall component; angle.
-    """
+    """Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it."""
 
 
 @native("out")
@@ -229,21 +170,13 @@ def single_ring_waves(
 
 @native("matrix")
 def subtract_block(
-    block: Float64[Array, "m n"],
-    columns: Int64[Array, " m"],
-    rows: Int64[Array, " n"],
-    scale: Float64[Array, " size"],
-    matrix: Float64[Array, "size size"],
+    block: Float64[Array, "m n"],  # its columns, one after the other
+    columns: Int64[Array, " m"],  # of the matrix
+    rows: Int64[Array, " n"],  # of the matrix
+    scale: Float64[Array, " size"],  # number of each column of the matrix
+    matrix: Float64[Array, "size size"],  # its columns, one after the other
 ) -> None:
-    """Subtract a block from rows and columns of a square matrix, times a number for each column of the matrix.
-
-    Args:
-        block: its columns, one after the other.
-        columns: of the matrix.
-        rows: of the matrix.
-        scale: number of each column of the matrix.
-        matrix: its columns, one after the other.
-    """
+    """Subtract a block from rows and columns of a square matrix, times a number for each column of the matrix."""
 
 
 @native("field", rows="n")
@@ -270,90 +203,51 @@ def add_moments(
 
 @native("field", rows="n")
 def add_layer(
-    points: Float64[Array, "n 3"],
-    x_p: Float64[Array, "panels p"],
-    rho_p: Float64[Array, "panels p"],
-    density: Complex128[Array, "panels p modes 3"],
-    nodes: Float64[Array, " p"],
-    barycentric: Float64[Array, " p"],
-    fine: Float64[Array, " f"],
-    fine_weights: Float64[Array, " f"],
-    weights: Float64[Array, " p"],
-    field: Float64[Array, "n 4"],
+    points: Float64[Array, "n 3"],  # where
+    x_p: Float64[Array, "panels p"],  # nodes of the panels
+    rho_p: Float64[Array, "panels p"],  # nodes of the panels
+    density: Complex128[Array, "panels p modes 3"],  # complex modes (f_x, f_rho, g) ds/du on the nodes
+    nodes: Float64[Array, " p"],  # on [-1, 1]
+    barycentric: Float64[Array, " p"],  # weights of the nodes
+    fine: Float64[Array, " f"],  # abscissas of a finer Gauss rule, for panels near a point
+    fine_weights: Float64[Array, " f"],  # their weights
+    weights: Float64[Array, " p"],  # Gauss weights of the nodes
+    field: Float64[Array, "n 4"],  # velocity and pressure to add to
 ) -> None:
-    """Add the flow of a single layer on panels.
-
-    Args:
-        points: where.
-        x_p: nodes of the panels.
-        rho_p: nodes of the panels.
-        density: complex modes (f_x, f_rho, g) ds/du on the nodes.
-        nodes: on [-1, 1].
-        barycentric: weights of the nodes.
-        fine: abscissas of a finer Gauss rule, for panels near a point.
-        fine_weights: their weights.
-        weights: Gauss weights of the nodes.
-        field: velocity and pressure to add to.
-    """
+    """Add the flow of a single layer on panels."""
 
 
 @native("steps", "amplitudes", rows="waves")
 def wave_amplitudes(
-    wave_k: Float64[Array, " waves"],
-    weights: Float64[Array, " waves"],
-    orders: Int64[Array, " waves"],
-    bessel: Float64[Array, " waves"],
-    radius: float,
-    rho: Float64[Array, " columns"],
-    angle: Float64[Array, " columns"],
-    steepest: Float64[Array, " columns"],
-    first: Int64[Array, " edges"],
-    x: Float64[Array, " n"],
-    forces: Float64[Array, "n 2 3"],
-    steps: Float64[Array, "waves most"],
-    amplitudes: Float64[Array, "waves 2 2 most 3"],
+    wave_k: Float64[Array, " waves"],  # k of each wave
+    weights: Float64[Array, " waves"],  # of the nodes in k
+    orders: Int64[Array, " waves"],  # numbers of orders p
+    bessel: Float64[Array, " waves"],  # K_1/K_0 at k radius
+    radius: float,  # of the tube
+    rho: Float64[Array, " columns"],  # distance of each column from the axis
+    angle: Float64[Array, " columns"],  # polar angle of each column
+    steepest: Float64[Array, " columns"],  # wave that matters for each column
+    first: Int64[Array, " edges"],  # number of the first source of each column, and of all sources, (columns + 1,)
+    x: Float64[Array, " n"],  # of the sources
+    forces: Float64[Array, "n 2 3"],  # even and odd part, along x, rho and theta
+    steps: Float64[Array, "waves most"],  # to be filled with I_{p+1}/I_p at the wall
+    amplitudes: Float64[Array, "waves 2 2 most 3"],  # zeros, to be filled: even, odd; real, imaginary; order; flow
 ) -> None:
     """Add up the amplitudes of the flows of which each wave of the wall's reflection consists.
 
     Sources stand in columns along the tube. Of the forces the even part moves even waves, the odd part odd ones.
-
-    Args:
-        wave_k: k of each wave.
-        weights: of the nodes in k.
-        orders: numbers of orders p.
-        bessel: K_1/K_0 at k radius.
-        radius: of the tube.
-        rho: distance of each column from the axis.
-        angle: polar angle of each column.
-        steepest: wave that matters for each column.
-        first: number of the first source of each column, and of all sources, (columns + 1,).
-        x: of the sources.
-        forces: even and odd part, along x, rho and theta.
-        steps: to be filled with I_{p+1}/I_p at the wall.
-        amplitudes: zeros, to be filled: even, odd; real, imaginary; order; flow.
     """
 
 
 @native("field", rows="n")
 def add_waves(
-    points: Float64[Array, "n 3"],
-    steepest: Float64[Array, " n"],
-    wave_k: Float64[Array, " waves"],
-    orders: Int64[Array, " waves"],
-    radius: float,
-    steps: Float64[Array, "waves most"],
-    amplitudes: Float64[Array, "waves 2 2 most 3"],
-    field: Float64[Array, "n 4"],
+    points: Float64[Array, "n 3"],  # (x, y, z) about the tube's axis, no farther from it than the radius
+    steepest: Float64[Array, " n"],  # wave from which on nothing is added at each point; they are faded out towards it
+    wave_k: Float64[Array, " waves"],  # k of each wave
+    orders: Int64[Array, " waves"],  # numbers of orders p
+    radius: float,  # of the tube
+    steps: Float64[Array, "waves most"],  # of `wave_amplitudes`
+    amplitudes: Float64[Array, "waves 2 2 most 3"],  # of `wave_amplitudes`
+    field: Float64[Array, "n 4"],  # velocity (x, y, z) and pressure to add to
 ) -> None:
-    """Add velocity (times 8 pi mu) and pressure (times 8 pi) of waves.
-
-    Args:
-        points: (x, y, z) about the tube's axis, no farther from it than the radius.
-        steepest: wave from which on nothing is added at each point; they are faded out towards it.
-        wave_k: k of each wave.
-        orders: numbers of orders p.
-        radius: of the tube.
-        steps: of `wave_amplitudes`.
-        amplitudes: of `wave_amplitudes`.
-        field: velocity (x, y, z) and pressure to add to.
-    """
+    """Add velocity (times 8 pi mu) and pressure (times 8 pi) of waves."""

@@ -61,20 +61,16 @@ def film_is_whole(film: Samples, radius: float) -> bool:
 
 @native()
 def clearance(
-    head: Float64[Array, "..."], x: float, half: float, ring: float, rounded: float, e: float, lift: float, side: float
+    head: Float64[Array, "..."],  # head of a packed table
+    x: float,  # place on the body's axis
+    half: float,  # half-length of the spheroid, 0 for a ring
+    ring: float,  # radius of the ring or spheroid
+    rounded: float,  # radius of the ball that runs around on the ring
+    e: float,  # offset of the body's middle
+    lift: float,  # component of the body's axis towards the tube's axis
+    side: float,  # component of the body's axis to the side
 ) -> float:
-    """Depth by which a ring, or a spheroid, may sink until it touches the wall, m.
-
-    Args:
-        head: head of a packed table.
-        x: place on the body's axis.
-        half: half-length of the spheroid, 0 for a ring.
-        ring: radius of the ring or spheroid.
-        rounded: radius of the ball that runs around on the ring.
-        e: offset of the body's middle.
-        lift: component of the body's axis towards the tube's axis.
-        side: component of the body's axis to the side.
-    """
+    """Depth by which a ring, or a spheroid, may sink until it touches the wall, m."""
 
 
 @native()
@@ -107,42 +103,31 @@ def spline_weights(at: float, first: float, last: float, intervals: int, out: Fl
 
 
 @native("out")
-def film_at(packed: Float64[Array, "..."], e: float, p: float, psi: float, out: Float64[Array, "6 6"]) -> float:
+def film_at(
+    packed: Float64[Array, "..."],  # a film's table, packed
+    e: float,  # offset of the body's middle from the tube's axis, m, at least 0
+    p: float,  # pitch, rad, positive where the nose points away from the wall
+    psi: float,  # yaw, rad
+    out: Float64[Array, "6 6"],  # (6, 6), the result
+) -> float:
     """Write the film's resistance (6x6, per viscosity, in F about the body's middle); the body's smallest gap, m.
 
     Outside of the table the film goes on: as power laws below its thinnest clearances, unchanged beyond its largest
     yaw. Where the body touches the wall, the clearances are 1e-12 of its radius, and the gap is negative.
-
-    Args:
-        packed: a film's table, packed.
-        e: offset of the body's middle from the tube's axis, m, at least 0.
-        p: pitch, rad, positive where the nose points away from the wall.
-        psi: yaw, rad.
-        out: (6, 6), the result.
     """
 
 
 @native("out")
 def lift_of_cavitation(
-    gap: Float64[Array, "count"],
-    bend: Float64[Array, "count"],
-    opening: Float64[Array, "count"],
-    entrainment: Float64[Array, "count"],
-    viscosity: float,
-    bound: float,
-    out: Float64[Array, "count 6"],
+    gap: Float64[Array, "count"],  # smallest gaps h0, m
+    bend: Float64[Array, "count"],  # R' of the gaps h0 + x^2/(2 R'), m
+    opening: Float64[Array, "count"],  # V = dh0/dt, m/s
+    entrainment: Float64[Array, "count"],  # u, mean velocity of both surfaces as seen from the contact line, m/s
+    viscosity: float,  # Pa s
+    bound: float,  # p_c, the pressure is not below -p_c, Pa
+    out: Float64[Array, "count 6"],  # force that opens the gap, force that works on u, their derivatives in V, and in u
 ) -> None:
-    """Fill what the bound of the pressure adds to the forces of line contacts, per length, N/m.
-
-    Args:
-        gap: smallest gaps h0, m, (n,).
-        bend: R' of the gaps h0 + x^2/(2 R'), m, (n,).
-        opening: V = dh0/dt, m/s, (n,).
-        entrainment: u, mean velocity of both surfaces as seen from the contact line, m/s, (n,).
-        viscosity: Pa s.
-        bound: p_c, the pressure is not below -p_c, Pa.
-        out: force that opens the gap, force that works on u, their derivatives in V, and in u, (n, 6).
-    """
+    """Fill what the bound of the pressure adds to the forces of line contacts, per length, N/m."""
 
 
 MOTIONS = 8
@@ -328,14 +313,12 @@ def largest_yaw(table: Float64[Array, "..."], e: float, pitch: float) -> float:
 
 
 @native()
-def limited_yaw(limit: Float64[Array, "7"], x: float, pitch: float) -> float:
-    """Largest yaw at a place, rad.
-
-    Args:
-        limit: of `yaw_limit_of`.
-        x: offset of the body's mid-length over R.
-        pitch: nose up, rad.
-    """
+def limited_yaw(
+    limit: Float64[Array, "7"],  # of `yaw_limit_of`
+    x: float,  # offset of the body's mid-length over R
+    pitch: float,  # nose up, rad
+) -> float:
+    """Largest yaw at a place, rad."""
 
 
 def yaw_limit_of(x: Samples, pitches: Samples, yaws: Samples, most: float) -> Samples:
@@ -394,38 +377,24 @@ def resistance_at(
 
 @native("out")
 def mean_resistance_at(
-    table: Float64[Array, "..."], e: float, pitch: float, yaw: float, phases: int, out: Float64[Array, "8 8"]
+    table: Float64[Array, "..."],  # from `packed`
+    e: float,  # offset of the body's mid-length from the tube's axis, m
+    pitch: float,  # nose up, away from the near wall, rad
+    yaw: float,  # nose to the side, rad
+    phases: int,  # number of phases, evenly spaced
+    out: Float64[Array, "8 8"],
 ) -> int:
-    """Fill the 8x8 of a place, averaged over phases of the tail; arguments as `resistance_at`.
-
-    Args:
-        table: from `packed`.
-        e: offset of the body's mid-length from the tube's axis, m.
-        pitch: nose up, away from the near wall, rad.
-        yaw: nose to the side, rad.
-        phases: number of phases, evenly spaced.
-        out: to be filled, (8, 8).
-    """
+    """Fill the 8x8 of a place, averaged over phases of the tail; arguments as `resistance_at`."""
 
 
 @native("out")
 def mean_resistances(
-    tables: Float64[Array, "rows size"],
-    which: Int64[Array, "count"],
-    gap: Float64[Array, "count"],
-    pitch: Float64[Array, "count"],
-    yaw: Float64[Array, "count"],
-    phases: int,
+    tables: Float64[Array, "rows size"],  # packed tables, one in each row, see `packed`
+    which: Int64[Array, "count"],  # row of each place's table
+    gap: Float64[Array, "count"],  # smallest distances between body and wall, m
+    pitch: Float64[Array, "count"],  # nose up, rad
+    yaw: Float64[Array, "count"],  # nose to the side, rad
+    phases: int,  # number of phases, evenly spaced
     out: Float64[Array, "count 8 8"],
 ) -> None:
-    """Fill the 8x8 at many places, averaged over the tail's phase, viscosity 1; NaN outside the table.
-
-    Args:
-        tables: packed tables, one in each row, see `packed`.
-        which: row of each place's table, (n,).
-        gap: smallest distances between body and wall, m, (n,).
-        pitch: nose up, rad, (n,).
-        yaw: nose to the side, rad, (n,).
-        phases: number of phases, evenly spaced.
-        out: to be filled, (n, 8, 8).
-    """
+    """Fill the 8x8 at many places, averaged over the tail's phase, viscosity 1; NaN outside the table."""

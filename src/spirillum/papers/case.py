@@ -251,7 +251,9 @@ def _own_values(
     quantities = {name: case.quantities[name] for name in names}
     for kind in dict.fromkeys(quantity.of.partition(".")[0] for quantity in quantities.values()):
         if kind == "run":
-            values = _run(robot, point, progress)
+            values = {
+                name: CaseValue(value, None) for name, value in released_motion(robot, point.run, progress).items()
+            }
         else:
             values = _KINDS[kind](robot, point.model or case.model, point, trial is None)
         known |= {f"{kind}.{name}": value for name, value in values.items()}
@@ -301,11 +303,6 @@ def _tail(robot: Robot, model: str, _point: CasePoint, _is_nominal: bool) -> dic
     matrix = resistance(robot, part="tail", model=model, about="tail-root").matrix
     errors = tail_error(RobotBatch.of(robot), CHECKED[model])._asdict()
     return {name: CaseValue(abs(float(matrix[index])), abs(errors[name]) / 100.0) for name, index in _ENTRIES.items()}
-
-
-def _run(robot: Robot, point: CasePoint, progress: Progress | None) -> dict[str, CaseValue]:
-    """Motion of the robot released in its tube, SI."""
-    return {name: CaseValue(value, None) for name, value in released_motion(robot, point.run, progress).items()}
 
 
 _KINDS: Mapping[str, Callable[[Robot, str, CasePoint, bool], dict[str, CaseValue]]] = {

@@ -12,9 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from spirillum.papers.biorob2012.claims import claims_of_study, predictions_of_study
 from spirillum.papers.biorob2012.figures import PAPER_FIGURES, more_figures
 from spirillum.papers.claim import Claim
-from spirillum.papers.studies import study_of
-from spirillum.studies.run import computed_study, study_fingerprint
-from spirillum.studies.study_loader import load_study
 from spirillum.view.figures.sheet import Picture
 from spirillum.view.figures.study import study_figures
 from spirillum.view.figures.study_panels import PaperFigure
@@ -59,10 +56,3 @@ def figures_of(dataset: xr.Dataset) -> dict[str, Picture]:
     if paper is None:
         return study_figures(dataset)
     return {**study_figures(dataset, paper.layout), **paper.figures(dataset)}
-
-
-def study_claims(name: str) -> list[Claim]:
-    """Statements of a paper, each with its verdict, from its study as it ships, without observations."""
-    loaded = load_study(study_of(name))
-    fingerprint = study_fingerprint(loaded, None)
-    return claims_of(computed_study(loaded, None, fingerprint, None, lambda _what, _done, _total: None))

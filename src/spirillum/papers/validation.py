@@ -28,7 +28,10 @@ from spirillum.papers.case import (
     values_at,
 )
 from spirillum.papers.claim import Claim, Verdict
-from spirillum.papers.registry import study_claims
+from spirillum.papers.registry import claims_of
+from spirillum.papers.studies import study_of
+from spirillum.studies.run import computed_study, study_fingerprint
+from spirillum.studies.study_loader import load_study
 
 Progress = Callable[[str, int, int], None]
 
@@ -252,7 +255,9 @@ def compute_case(name: str, progress: Progress | None = None, *, runs: bool = Fa
     claims = [judge_trend(case, statement, rows) for statement in case.statements]
     read: list[Provenance] = [statement.read for statement in case.statements]
     if case.claims:
-        more = study_claims(case.claims)
+        loaded = load_study(study_of(case.claims))
+        fingerprint = study_fingerprint(loaded, None)
+        more = claims_of(computed_study(loaded, None, fingerprint, None, lambda _what, _done, _total: None))
         stated: list[Provenance] = ["text"] * len(more)
         claims, read = [*claims, *more], [*read, *stated]
     return CaseResult(name, case, rows, tuple(claims), tuple(read))

@@ -42,7 +42,14 @@ def _drawn(result: CaseResult) -> Figure:
         panels.append((_height(len(rows)), lambda axes: _forest(axes, result, rows)))
     if result.case.curve:
         panels.append((_CURVE, lambda axes: _curves(axes, result)))
-    if effects := _mean_effects(result):
+    found: dict[str, dict[str, list[float]]] = {}
+    for row in result.rows:
+        for effect in row.effects:
+            changes = found.setdefault(f"{effect.assumption}: {effect.value}", {})
+            changes.setdefault(row.name, []).append(effect.ours / row.ours - 1.0)
+    if effects := [
+        (name, {key: float(np.mean(part)) for key, part in changes.items()}) for name, changes in found.items()
+    ]:
         panels.append((_height(len(effects)), lambda axes: _effects(axes, result, effects)))
     sheet = Sheet(
         plain(f"{result.name}: {result.case.title}", 110),
@@ -142,16 +149,6 @@ def _curves(axes: Axes, result: CaseResult) -> None:
 
 
 _Effect = tuple[str, dict[str, float]]
-
-
-def _mean_effects(result: CaseResult) -> list[_Effect]:
-    """Name of each value of an assumption, and its mean relative effect on ours by quantity."""
-    found: dict[str, dict[str, list[float]]] = {}
-    for row in result.rows:
-        for effect in row.effects:
-            changes = found.setdefault(f"{effect.assumption}: {effect.value}", {})
-            changes.setdefault(row.name, []).append(effect.ours / row.ours - 1.0)
-    return [(name, {key: float(np.mean(part)) for key, part in changes.items()}) for name, changes in found.items()]
 
 
 def _effects(axes: Axes, result: CaseResult, effects: Sequence[_Effect]) -> None:

@@ -135,6 +135,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
     prepare: bool = False,
     answer: str = "held",
     figures: bool = True,
+    vector: bool = False,
     progress: Progress | None = None,
 ) -> Calibrated:
     """Fit parameters of a model to observed speeds and rates.
@@ -157,6 +158,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
         answer: what is fitted: `held`, or `trial`, released in the tube as `predict` has it (free:
             `friction_coefficient`, `shared_friction`, `roughness`); a second for each of 32 trials of a robot.
         figures: draw figures, which takes some seconds.
+        vector: write figures as SVG beside PNG.
         progress: called with stage, number done, and total.
 
     Raises:
@@ -184,11 +186,20 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             answer=answer,
             progress=progress,
         )
-        return found if folder is None else write_calibration(found, folder, figures=figures, progress=progress)
+        return (
+            found
+            if folder is None
+            else write_calibration(found, folder, figures=figures, vector=vector, progress=progress)
+        )
 
 
 def write_calibration(
-    found: Calibrated, folder: Path, *, figures: bool = True, progress: Progress | None = None
+    found: Calibrated,
+    folder: Path,
+    *,
+    figures: bool = True,
+    vector: bool = False,
+    progress: Progress | None = None,
 ) -> Calibrated:
     """Write all files of a calibration, the figures last, each whole or not at all; return it with their names."""
     # The numbers are all made before the first takes the place of an earlier calibration's, and what that one had more
@@ -207,7 +218,7 @@ def write_calibration(
         if path not in written:
             path.unlink(missing_ok=True)
     if figures:
-        written += _drawn(found, folder, progress)
+        written += _drawn(found, folder, progress, vector=vector)
     files = sorted(str(path.relative_to(folder)) for path in written)
     gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
     said = [Note("files", f"{folder} held an earlier calibration: its {gone} are gone")] if gone else []
@@ -222,7 +233,7 @@ def _gone(paths: Sequence[Path]) -> str:
     return " and ".join(names)
 
 
-def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:
+def _drawn(found: Calibrated, folder: Path, progress: Progress | None, *, vector: bool) -> list[Path]:
     from spirillum.view.figures.calibration import calibration_figures
     from spirillum.view.figures.style import save
 
@@ -231,7 +242,7 @@ def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[P
     inside = output_folder(folder / "figures", folder)
     written: list[Path] = []
     for name, figure in calibration_figures(found).items():
-        written += save(figure, inside / name)
+        written += save(figure, inside / name, vector=vector)
     on_progress("figures", 1, 1)
     return written
 

@@ -44,13 +44,17 @@ def write_measurement_report(
     folder: Path,
     thumbnails: Mapping[str, bytes],
     on_progress: Callable[[str, int, int], None],
+    *,
+    vector: bool = False,
 ) -> list[str]:
-    """Write `figures/` (PNG and SVG) and `report.html`, each whole or not at all; return their names in the folder."""
+    """Write `figures/` and `report.html`, each whole or not at all; return their names in the folder."""
     from spirillum.view.figures.measurement import measurement_figures
 
     pictures = measurement_figures(measurement)
     steps = len(pictures) + 1
-    embedded = draw_pictures(pictures, folder, lambda _name, done: on_progress("figures and report", done, steps))
+    embedded = draw_pictures(
+        pictures, folder, lambda _name, done: on_progress("figures and report", done, steps), vector=vector
+    )
     write_text(folder / "report.html", _page(measurement, embedded, thumbnails))
     on_progress("figures and report", steps, steps)
     return [*(name for picture in embedded for name in picture.files), "report.html"]
@@ -134,7 +138,7 @@ def _rows(quantities: Mapping[str, Measured], counts: Mapping[str, int] | None =
     ]
 
 
-def measure(
+def measure(  # noqa: PLR0913 - the options of the command
     videos: str | Path | Sequence[str | Path],
     setup: str | Path,
     output: str | Path | None = None,
@@ -144,6 +148,7 @@ def measure(
     tracking: bool = True,
     annotated: bool = True,
     figures: bool = True,
+    vector: bool = False,
     start: str | float | None = None,
     end: str | float | None = None,
     overrides: Mapping[str, Any] | None = None,
@@ -162,6 +167,7 @@ def measure(
         tracking: look for the robot in the videos; if not, the readings by hand are all there is.
         annotated: write an annotated video of each trial.
         figures: draw figures and write the report.
+        vector: write figures as SVG beside PNG.
         start: time in the video from which to measure, with its unit or a float in s; None: the setup's.
         end: time until which to measure, with its unit or a float in s; None: the setup's.
         overrides: dotted fields of the robot, as for `spirillum.load`.
@@ -180,7 +186,7 @@ def measure(
         return _measured(asked, None, on_progress)
     inputs = (*asked.videos, setup, marks, track, asked.folder / asked.setup.robot.file)
     with results_folder(output) as path, guard_inputs(*inputs):
-        folder = _Folder(path, annotated=annotated, figures=figures)
+        folder = _Folder(path, annotated=annotated, figures=figures, vector=vector)
         folder.check(asked)
         Thread(target=_import_ahead, kwargs={"figures": figures}, daemon=True).start()
         return _measured(asked, folder, on_progress)
@@ -206,6 +212,7 @@ class _Folder:
     path: Path
     annotated: bool
     figures: bool
+    vector: bool
     files: list[str] = field(default_factory=list)  # names of the files that were written
     thumbnails: dict[str, bytes] = field(default_factory=dict)  # JPEG of an annotated frame by the trial's name
 
@@ -310,5 +317,5 @@ def _finished(
     found = replace(found, files=tuple(folder.files), left=tuple(left))
     if not folder.figures:
         return found
-    more = write_measurement_report(found, folder.path, folder.thumbnails, on_progress)
+    more = write_measurement_report(found, folder.path, folder.thumbnails, on_progress, vector=folder.vector)
     return replace(found, files=(*found.files, *more))

@@ -23,29 +23,31 @@ class EmbeddedPicture:
     caption: str
     alternative: str
     source: str  #: The picture itself as a data URI.
-
-    @property
-    def files(self) -> tuple[str, str]:
-        """Names of its files, as seen from the folder of the report."""
-        return f"figures/{self.name}.png", f"figures/{self.name}.svg"
+    files: tuple[str, ...]  #: Its files, as seen from the folder of the report: the PNG, then the SVG if there is one.
 
 
 def draw_pictures(
-    pictures: Mapping[str, Picture], folder: Path, on_progress: Callable[[str, int], None], *, largest_svg: int = 0
+    pictures: Mapping[str, Picture],
+    folder: Path,
+    on_progress: Callable[[str, int], None],
+    *,
+    vector: bool = False,
+    largest_svg: int = 0,
 ) -> list[EmbeddedPicture]:
-    """Write `figures/` (PNG and SVG), each file whole or not at all."""
+    """Write `figures/`, PNG and with `vector` also SVG, each file whole or not at all."""
     from spirillum.view.figures.style import save
 
     figures = output_folder(folder / "figures", folder)
     found = []
     for done, (name, picture) in enumerate(pictures.items()):
         on_progress(name, done)
-        png, svg = save(picture.figure(), figures / name)
-        if svg.stat().st_size <= largest_svg:
-            source = data_uri(svg.read_bytes(), "svg+xml")
+        paths = save(picture.figure(), figures / name, vector=vector)
+        if vector and paths[-1].stat().st_size <= largest_svg:
+            source = data_uri(paths[-1].read_bytes(), "svg+xml")
         else:
-            source = data_uri(png.read_bytes(), "png")
-        found.append(EmbeddedPicture(name, picture.title, picture.caption, picture.alternative, source))
+            source = data_uri(paths[0].read_bytes(), "png")
+        files = tuple(f"figures/{path.name}" for path in paths)
+        found.append(EmbeddedPicture(name, picture.title, picture.caption, picture.alternative, source, files))
     return found
 
 

@@ -77,8 +77,10 @@ def _rebuilt(table: Mapping[str, Any]) -> Robot:
 _LARGEST_SVG = 2_000_000  # a larger vector picture is embedded as pixels, bytes
 
 
-def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:
-    """Write `figures/` (PNG and SVG), a self-contained `report.html`, and the files of `write_tables`."""
+def write_report(
+    dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None], *, vector: bool = False
+) -> None:
+    """Write `figures/`, a self-contained `report.html`, and the files of `write_tables`."""
     ranking = ranking_of(dataset)
     robot = robot_picture(dataset, ranking)
     first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
@@ -87,7 +89,11 @@ def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, 
     pictures = {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
     steps = len(pictures) + 1
     embedded = draw_pictures(
-        pictures, folder, lambda name, done: on_progress(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
+        pictures,
+        folder,
+        lambda name, done: on_progress(f"figure {name}", done, steps),
+        vector=vector,
+        largest_svg=_LARGEST_SVG,
     )
     on_progress("report", len(pictures), steps)
     claims, predictions = write_tables(dataset, folder)
@@ -151,6 +157,7 @@ def study(  # noqa: PLR0913 - the options of the command
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     figures: bool = True,
+    vector: bool = False,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Run a study of many robots.
@@ -181,6 +188,7 @@ def study(  # noqa: PLR0913 - the options of the command
         posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
             model have 95 % intervals.
         figures: draw figures and write the report.
+        vector: write figures as SVG beside PNG.
         progress: called as the work goes on.
 
     Returns:
@@ -233,7 +241,7 @@ def study(  # noqa: PLR0913 - the options of the command
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
         if figures:
-            write_report(dataset, folder, on_progress)
+            write_report(dataset, folder, on_progress, vector=vector)
         else:
             write_tables(dataset, folder)
     return StudyDataset.of(dataset)

@@ -54,7 +54,7 @@ def validate(
             check_replaceable(folder / result)
         found = Validation(tuple(compute_case(name, progress, runs=runs) for name in chosen), str(output))
         pictures = {case.name: case_picture(case) for case in found.cases if case.rows}
-        embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None)}
+        embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None, vector=True)}
         text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
         write_text(folder / "validation.json", text + "\n")
         cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]

@@ -36,20 +36,15 @@ def _read_taper(value: Any) -> float | None:
     return float(value)
 
 
-def _read_channel(value: Any) -> Any:
-    if value == "none":
-        return None
-    if not isinstance(value, (dict, Channel)):
-        raise ValueError("'none', or a [channel] table")  # noqa: TRY004 - pydantic collects ValueError only
-    return value
+def _table_or_none(name: str) -> BeforeValidator:
+    def read(value: Any) -> Any:
+        if value == "none":
+            return None
+        if not isinstance(value, (dict, Section)):
+            raise ValueError(f"'none', or a [{name}] table")  # noqa: TRY004 - pydantic collects ValueError only
+        return value
 
-
-def _read_seal(value: Any) -> Any:
-    if value == "none":
-        return None
-    if not isinstance(value, (dict, Seal)):
-        raise ValueError("'none', or a [seal] table")  # noqa: TRY004 - pydantic collects ValueError only
-    return value
+    return BeforeValidator(read)
 
 
 def _read_stripes(value: Any) -> Any:
@@ -184,7 +179,7 @@ class Seal(Section):
     """Colours of equally wide stripes around; the first is centred on +z, the next follow from there towards -y."""
 
 
-SealOrNone = Annotated[Seal | None, BeforeValidator(_read_seal), NONE]
+SealOrNone = Annotated[Seal | None, _table_or_none("seal"), NONE]
 
 
 class Coupling(Section):
@@ -274,7 +269,7 @@ class Channel(Section):
     """Length L_ch (Table I)."""
 
 
-ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel), NONE]
+ChannelOrNone = Annotated[Channel | None, _table_or_none("channel"), NONE]
 
 
 PressureOrNone = Annotated[Pressure | None, UNSET, NONE]

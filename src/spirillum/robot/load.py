@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -19,16 +19,16 @@ from spirillum.notes import Note
 from spirillum.robot.arguments import check_set_once
 from spirillum.robot.fields import field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
-from spirillum.robot.robot import Derived, Robot
+from spirillum.robot.robot import Robot
 from spirillum.robot.shape_input import DISPLACED, FILES, smoothing_notes, with_points_of_files
 from spirillum.units import show
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
 # A measured mass no longer describes the robot once one of these changes (Table I weighs body and coupling).
-_WEIGHED = {
-    "body": ("shape", "diameter", "length", "front", "rear", "fillet"),
-    "coupling": ("diameter", "length", "clearance"),
-}
+_WEIGHED = (
+    *(f"body.{name}" for name in ("shape", "diameter", "length", "front", "rear", "fillet")),
+    *(f"coupling.{name}" for name in ("diameter", "length", "clearance")),
+)
 # What belongs to a body of that size: a preset's value does not fit a robot that is scaled.
 _SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's", "drive.torques": "the motor's"}
 _SIZE = ("body.diameter", "body.length")
@@ -96,14 +96,14 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
         return robot
     check_set_once(overrides)
     table, source = raw_table(robot)
-    folder = _folder_of(robot)
+    folder = Path() if isinstance(robot, Mapping) else Path(robot).parent
     table, changes = _extended(with_points_of_files(table, folder), source, folder)
     for path, value in overrides.items():
         _displace(table, _nested(path, value))
         _put(table, path.split("."), value, path)
     table = with_points_of_files(table, Path())
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
-    robot = _checked(table, source, (*_stale_mass(table, changes), *_left_over(table, changes)))
+    robot = _checked(table, source, tuple(_stale(table, changes)))
     robot._warnings = (*robot.warnings, *_old_coupling(robot, changes))  # noqa: SLF001 - it is the loader's to set
     return robot
 
@@ -123,7 +123,7 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
         raise InputError(f"robot = {str(robot)[:60]!r}; allowed: {_WHAT}") from error
     if not str(robot):
         raise InputError(f"robot = ''; allowed: {_WHAT}")
-    if _looks_like_a_name(robot) and not path.exists():
+    if (isinstance(robot, str) and re.fullmatch(r"[\w-]{1,99}", robot) is not None) and not path.exists():
         presets = ", ".join(preset_names())
         hint = did_you_mean(str(robot), shipped_robots())
         raise InputError(f"'{robot}' is neither a preset nor a file{hint}; presets: {presets}")
@@ -146,10 +146,6 @@ def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) ->
     name = re.sub(r"[^\w-]+", "-", path.stem)[:100] or "robot"
     text = preset_text(preset).replace(f'name = "{preset}"', f'name = "{name}"', 1)
     new_file(path, text, overwrite=overwrite)
-
-
-def _looks_like_a_name(robot: str | Path) -> bool:
-    return isinstance(robot, str) and re.fullmatch(r"[\w-]{1,99}", robot) is not None
 
 
 def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelength=20mm") -> tuple[str, Any]:
@@ -193,11 +189,6 @@ def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | N
     if resolved and in_tube and not options.resolution:  # that of tables, asked for
         options = options.model_copy(update={"tube": options.tube.model_copy(update={"form": "direct"})})
     return robot.model_copy(update={"model": options})
-
-
-def _folder_of(robot: str | Path | Mapping[str, Any]) -> Path:
-    """Folder of a robot file, from which the files that it names are looked for."""
-    return Path() if isinstance(robot, Mapping) else Path(robot).parent
 
 
 def _extended(
@@ -302,34 +293,34 @@ def _touched(table: Mapping[str, Any]) -> set[str]:
     }
 
 
-def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[Note, ...]:
-    """Warn where a measured mass is older than the geometry that it weighs."""
-    body = table.get("body")
-    stale: list[str] = []
+def _older(changes: Sequence[set[str]], field: str, than: Sequence[str]) -> list[str]:
+    """The fields among `than` that layers have changed since one set a field."""
+    newer: list[str] = []
     for changed in changes:
-        newer = [f"{section}.{name}" for section, names in _WEIGHED.items() for name in names]
-        stale = [] if "body.mass" in changed else stale + [field for field in newer if field in changed]
-    if not stale or not isinstance(body, dict) or "mass" not in body:
-        return ()
-    words = f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew"
-    return (Note("robot-file-doubtful", words, ("body.mass", *stale)),)
+        newer = [] if field in changed else newer + [name for name in than if name in changed]
+    return newer
 
 
-def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[Note, ...]:
-    """Warn of what is older than the size of the body that it belongs to."""
-    found = []
+def _stale(table: Mapping[str, Any], changes: Sequence[set[str]]) -> Iterator[Note]:
+    """Warn of a mass that is older than the geometry it weighs, and of what belongs to a body of another size."""
+    body = table.get("body")
+    newer = _older(changes, "body.mass", _WEIGHED)
+    if newer and isinstance(body, dict) and "mass" in body:
+        yield _doubt(
+            f"body.mass = {body['mass']} was measured before {', '.join(newer)} changed; set it anew",
+            "body.mass",
+            *newer,
+        )
     for field, whose in _SIZED.items():
         section, name = field.split(".")
-        scaled: list[str] = []
-        for changed in changes:
-            scaled = [] if field in changed else scaled + [size for size in _SIZE if size in changed]
-        held = table.get(section)
-        if scaled and isinstance(held, dict) and held.get(name) is not None:
-            words = (
-                f"{field} = {held[name]} is {whose} of another body, before {', '.join(scaled)} changed; set it anew"
-            )
-            found.append(Note("robot-file-doubtful", words, (field, *scaled)))
-    return tuple(found)
+        newer, held = _older(changes, field, _SIZE), table.get(section)
+        if newer and isinstance(held, dict) and held.get(name) is not None:
+            words = f"{field} = {held[name]} is {whose} of another body, before {', '.join(newer)} changed; set it anew"
+            yield _doubt(words, field, *newer)
+
+
+def _doubt(words: str, *fields: str) -> Note:
+    return Note("robot-file-doubtful", words, fields)
 
 
 def _old_coupling(robot: Robot, changes: Sequence[set[str]]) -> tuple[Note, ...]:
@@ -342,65 +333,49 @@ def _old_coupling(robot: Robot, changes: Sequence[set[str]]) -> tuple[Note, ...]
                 f"coupling.{name} = {show(own, 'mm')} is that of another body and {beyond} than body.{name} = "
                 f"{show(body, 'mm')}; set it anew"
             )
-            return (Note("robot-file-doubtful", words, (f"coupling.{name}", f"body.{name}")),)
+            return (_doubt(words, f"coupling.{name}", f"body.{name}"),)
     return ()
 
 
-def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:
-    """Warn where buoyancy lifts the robot off the floor, which holds its lateral motion and tilt."""
+def _doubts(robot: Robot) -> Iterator[Note]:
+    """Warn of a robot that floats, of numbers that hardly fit, and of those that axial motion leaves out."""
+    derived = robot.derived()  # once: it integrates the solids
     weight = derived.get("submerged_weight")
-    if weight is None or weight.value > 0:
-        return ()
-    words = (
-        f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on the "
-        "floor; check body.mass"
-    )
-    return (Note("robot-floats", words, ("body.mass", "tail.density", "fluid.density")),)
-
-
-def _displaced(robot: Robot) -> tuple[Note, ...]:
-    """Warn that only released motion knows the righting torque of a centre of mass."""
-    if robot.body.center_of_mass is None:
-        return ()
-    words = "body.center_of_mass acts in released motion only; axial motion leaves its torque out: use motion 'free'"
-    return (Note("robot-file-doubtful", words, ("body.center_of_mass",)),)
-
-
-def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[Note, ...]:
-    """Warn of a mass that no metal has in the volume of body and coupling: most often it is another unit."""
-    if robot.body.mass is None:
-        return ()
-    density = robot.body.mass / (derived["body_volume"].value + derived["coupling_volume"].value)
-    if density <= _DENSEST:
-        return ()
-    words = (
-        f"body.mass = {show(robot.body.mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense; the densest "
-        f"metal has {_DENSEST:.4g}; check its unit"
-    )
-    return (Note("robot-file-doubtful", words, ("body.mass",)),)
-
-
-def _too_smooth(robot: Robot) -> tuple[Note, ...]:
-    """Warn of an effective friction below the rotor's own, which it contains (18)."""
+    if weight is not None and weight.value <= 0:
+        words = (
+            f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on the "
+            "floor; check body.mass"
+        )
+        yield Note("robot-floats", words, ("body.mass", "tail.density", "fluid.density"))
+    if robot.body.center_of_mass is not None:
+        words = (
+            "body.center_of_mass acts in released motion only; axial motion leaves its torque out: use motion 'free'"
+        )
+        yield _doubt(words, "body.center_of_mass")
+    if (mass := robot.body.mass) is not None:
+        density = mass / (derived["body_volume"].value + derived["coupling_volume"].value)
+        if density > _DENSEST:
+            words = (
+                f"body.mass = {show(mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense; the densest "
+                f"metal has {_DENSEST:.4g}; check its unit"
+            )
+            yield _doubt(words, "body.mass")
     own, whole = None if robot.motor is None else robot.motor.joint_rotor_friction, robot.friction.effective
-    if own is None or whole is None or whole >= own:
-        return ()
-    words = (
-        f"friction.effective = {show(whole, 'N m s/rad')} is less than the rotor's own B_m = {show(own, 'N m s/rad')}, "
-        "which it contains; check both"
-    )
-    return (Note("robot-file-doubtful", words, ("friction.effective", "motor.rotor_friction")),)
+    if own is not None and whole is not None and whole < own:
+        words = (
+            f"friction.effective = {show(whole, 'N m s/rad')} is less than the rotor's own B_m = "
+            f"{show(own, 'N m s/rad')}, which it contains; check both"
+        )
+        yield _doubt(words, "friction.effective", "motor.rotor_friction")
+    yield from smoothing_notes(robot.tail.form)
 
 
 def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> Robot:
-    problems = problems_in(Robot, table)
-    if isinstance(problems, Robot):
-        derived = problems.derived()  # once: it integrates the solids
-        doubts = (*_floating(derived), *_displaced(problems), *_too_dense(problems, derived), *_too_smooth(problems))
-        doubts += smoothing_notes(problems.tail.form)
-        problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
-        return problems
-    raise refused_table(problems, source)
+    robot = problems_in(Robot, table)
+    if not isinstance(robot, Robot):
+        raise refused_table(robot, source)
+    robot._warnings = (*warnings, *_doubts(robot))  # noqa: SLF001 - it is the loader's to set
+    return robot
 
 
 def robot_answer(robot: Robot) -> dict[str, Any]:
@@ -421,8 +396,3 @@ def checked(robot: str, overrides: Mapping[str, Any]) -> tuple[tuple[str, ...], 
         return (), load(robot, **overrides).warnings
     except InputError as error:
         return error.problems, ()
-
-
-def check_answer(robot: str, problems: Sequence[str], warnings: Sequence[str]) -> dict[str, Any]:
-    """Whether a robot file is valid, as `spirillum robot check` prints it."""
-    return envelope("check", {"robot": robot, "valid": not problems, "problems": list(problems)}, warnings)

@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, check_memory
-from spirillum.robot.geometry import Centreline, Seal, StripeColour, centreline
+from spirillum.robot.geometry import Centreline, StripeColour, centreline
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
@@ -118,7 +118,12 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
     20. The seal's first stripe is centred on +z; the next ones follow in the positive sense about +x, from +z towards
     -y.
     """
-    fineness = _checked_fineness(fineness)
+    try:
+        number = float(fineness)
+    except (TypeError, ValueError):
+        number = float("nan")
+    if not _FINENESS[0] <= number <= _FINENESS[1]:
+        raise InputError(f"fineness = {fineness!r}; allowed: {_FINENESS[0]} to {_FINENESS[1]}")
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
     outlines = outlines_of(robot)
     pieces = [_body(robot, outlines["body"], around)] if robot.has_body else []
@@ -136,17 +141,6 @@ def _check_triangles(cause: str, rings: int, around: int) -> None:
     check_memory(
         cause, 2.0 * rings * around, "triangles", _TRIANGLE, "as with a smaller fineness or a longer wavelength"
     )
-
-
-def _checked_fineness(fineness: float) -> float:
-    """The fineness as a number in its range."""
-    try:
-        number = float(fineness)
-    except (TypeError, ValueError):
-        number = float("nan")
-    if not _FINENESS[0] <= number <= _FINENESS[1]:
-        raise InputError(f"fineness = {fineness!r}; allowed: {_FINENESS[0]} to {_FINENESS[1]}")
-    return number
 
 
 def _piece(
@@ -167,7 +161,14 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
     seal = robot.seal
     if seal is None:
         return _piece("body", "body", revolved(profile_of(outline, around), around), ("body",), (COLOURS["body"],))
-    _check_seal(robot, seal)
+    body = robot.body
+    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
+    longest = body.length - nose
+    if seal.length > longest * (1.0 + 1e-12):
+        raise InputError(
+            f"seal.length = {show(seal.length, 'mm')}; allowed: at most {show(longest, 'mm')}, where the nose of the "
+            "body begins, or seal = 'none' for a plain body"
+        )
     front, stripes = seal.length - 0.5 * robot.body.length, len(seal.stripes)
     profile = profile_of(outline, around, (front,))
     sectors = max(stripes, 1)
@@ -181,18 +182,6 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
     names = ("body", "seal", *(f"stripe {index + 1}" for index in range(stripes)))
     palette = (COLOURS["body"], COLOURS["seal"], *(STRIPE_COLOURS[colour] for colour in seal.stripes))
     return _piece("body", "body", surface, names, palette, region)
-
-
-def _check_seal(robot: Robot, seal: Seal) -> None:
-    """The seal ends behind the nose."""
-    body = robot.body
-    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
-    longest = body.length - nose
-    if seal.length > longest * (1.0 + 1e-12):
-        raise InputError(
-            f"seal.length = {show(seal.length, 'mm')}; allowed: at most {show(longest, 'mm')}, where the nose of the "
-            "body begins, or seal = 'none' for a plain body"
-        )
 
 
 def _rotor(

@@ -236,16 +236,6 @@ def _end(end: End | None, x_tip: float, outward: float, radius: float, fillet: f
     return [Segment((x_tip, 0.0), (x_tip, radius))]
 
 
-def _reversed(pieces: list[Segment | Arc]) -> list[Segment | Arc]:
-    turned: list[Segment | Arc] = []
-    for piece in reversed(pieces):
-        if isinstance(piece, Segment):
-            turned.append(Segment(piece.end, piece.start))
-        else:
-            turned.append(Arc(piece.centre, piece.semi_axes, (piece.angles[1], piece.angles[0])))
-    return turned
-
-
 def body_outline(
     shape: Shape,
     diameter: float,
@@ -262,7 +252,12 @@ def body_outline(
     if shape in ("sphere", "spheroid"):
         return Outline((Arc((0.0, 0.0), (half, radius), (0.0, np.pi)),), ())
     nose = _end(front, half, 1.0, radius, fillet)
-    tail = _reversed(_end(rear, -half, -1.0, radius, fillet))
+    tail = [
+        Segment(piece.end, piece.start)
+        if isinstance(piece, Segment)
+        else Arc(piece.centre, piece.semi_axes, piece.angles[::-1])
+        for piece in reversed(_end(rear, -half, -1.0, radius, fillet))
+    ]
     x_front, x_rear = nose[-1].points(np.ones(1))[0][0], tail[0].points(np.zeros(1))[0][0]
     side: list[Segment | Arc] = [Segment((float(x_front), radius), (float(x_rear), radius))]
     if x_front - x_rear < 1e-9 * length:

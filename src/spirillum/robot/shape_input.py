@@ -17,7 +17,7 @@ from spirillum.files.limits import MOST_POINTS
 from spirillum.files.reading import csv_rows, number_in
 from spirillum.notes import Note
 from spirillum.robot.fields import refuse
-from spirillum.robot.tail_form import Along, CentreLine, CurvePoints, TailForm, centre_line, mean_of_inverse
+from spirillum.robot.tail_form import Along, CurvePoints, TailForm, along_points, centre_line
 from spirillum.scalars import is_number
 from spirillum.units import KINDS, parse_quantity, show
 
@@ -128,14 +128,11 @@ def read_tail(raw: Any) -> Any:
                 if table.get(f"{name}_along"):
                     raise refuse(f"tail.{name} and tail.{name}_along both vary along the tail; allowed: one of them")
                 table[name], table[f"{name}_along"] = _read_along(table[name], name, table.get("length"))
-        if _given(table.get("curve_tolerance")):
+        tolerance = table.get("curve_tolerance")
+        if tolerance is not None and parse_or_refuse("tail.curve_tolerance", tolerance, "length or zero") > 0:
             raise refuse("tail.curve_tolerance is set without tail.curve; allowed: both, or neither")
         return table
     return _read_curve(table)
-
-
-def _given(tolerance: Any) -> bool:
-    return tolerance is not None and parse_or_refuse("tail.curve_tolerance", tolerance, "length or zero") > 0
 
 
 def parse_or_refuse(field: str, value: Any, kind: str) -> float:
@@ -161,7 +158,11 @@ def _read_along(value: Any, name: str, length: Any) -> tuple[str, Along]:
     else:
         pairs = _table_along(value, field, length, allowed)
     along = tuple(pairs)
-    size = max(item for _, item in along) if name == "amplitude" else 1.0 / mean_of_inverse(along)
+    size = (
+        max(item for _, item in along)
+        if name == "amplitude"
+        else 1.0 / float(along_points(along, inverse=True)[2](1.0))
+    )
     return f"{size!r} m", tuple((share, item / size) for share, item in along)
 
 
@@ -207,7 +208,12 @@ def _read_curve(table: dict[str, Any]) -> dict[str, Any]:
     tolerance = parse_or_refuse("tail.curve_tolerance", table.get("curve_tolerance") or "0 mm", "length or zero")
     _check_order(points)
     line = centre_line(points, tolerance)
-    follows = _sizes_of(line)
+    follows = {
+        "wavelength": f"{line.reach / line.turns!r} m",
+        "amplitude": f"{line.amplitude!r} m",
+        "length": f"{line.reach!r} m",
+        "handedness": "left" if line.winding < 0 else "right",
+    }
     for name, value in follows.items():
         own = table.get(name)
         if own is None:
@@ -242,15 +248,6 @@ def smoothing_notes(form: TailForm) -> tuple[Note, ...]:
         f"by {amplitude}, length by {length}: lower it"
     )
     return (Note("curve-smoothed", words, ("tail.curve_tolerance", "tail.curve")),)
-
-
-def _sizes_of(line: CentreLine) -> dict[str, str]:
-    return {
-        "wavelength": f"{line.reach / line.turns!r} m",
-        "amplitude": f"{line.amplitude!r} m",
-        "length": f"{line.reach!r} m",
-        "handedness": "left" if line.winding < 0 else "right",
-    }
 
 
 def read_profile(table: dict[str, Any]) -> dict[str, Any]:

@@ -131,7 +131,8 @@ def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Sur
     """
     around = max(around, _LEAST_AROUND)
     least = np.argmin(np.abs(tangents), axis=1)
-    some = _unit(np.cross(tangents, np.eye(3)[least]))  # any vector perpendicular to the curve will do
+    some = np.cross(tangents, np.eye(3)[least])  # any vector perpendicular to the curve will do
+    some = some / np.linalg.norm(some, axis=-1, keepdims=True)
     chord, own = np.diff(points, axis=0), some[:-1]
     carried, turned = _reflected(own, chord), _reflected(tangents[:-1], chord)
     carried = _reflected(carried, tangents[1:] - turned)
@@ -141,11 +142,6 @@ def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Sur
     across = np.cos(angle)[..., None] * some[:, None]
     across = across + np.sin(angle)[..., None] * np.cross(tangents, some)[:, None]
     return _closed(points[0], points[:, None] + radius * across, points[-1])
-
-
-def _unit(vectors: Samples) -> Samples:
-    unit: Samples = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return unit
 
 
 def _reflected(vectors: Samples, normals: Samples) -> Samples:

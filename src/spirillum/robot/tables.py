@@ -85,37 +85,44 @@ class Drive(Section):
             return None
         return TorqueCurve(self.rates, self.torques, 1.0 if self.polarity == "forward" else -1.0)
 
-    def curve_problems(self) -> list[str]:
-        """A sentence for each rule of a curve that is broken."""
-        is_curve = self.kind == "torque-speed"
-        problems = [
-            f"drive.{name} is {'missing' if is_curve else 'set'} with drive.kind = '{self.kind}'; "
-            f"allowed: drive.{name} exactly when drive.kind = 'torque-speed'"
-            for name in ("rates", "torques")
-            if (getattr(self, name) is not None) != is_curve
-        ]
-        if not is_curve:
-            if self.polarity != "forward":
-                problems.append("drive.polarity = 'reverse'; allowed: only with drive.kind = 'torque-speed'")
-            return problems
-        if self.joint == "fixed":
-            problems.append("drive.joint = 'fixed' with drive.kind = 'torque-speed'; allowed: 'revolute'")
-        if self.rates is None or self.torques is None:
-            return problems
+    def problems(self) -> list[str]:
+        """A sentence for each rule between the fields that is broken."""
+        kind, found = self.kind, []
+        if (joint := _JOINTS.get(kind, self.joint)) != self.joint:
+            found.append(f"drive.joint = '{self.joint}' with drive.kind = '{kind}'; allowed: '{joint}'")
+        if self.duty != 1.0 and kind != "dc-motor":
+            found.append(f"drive.duty = {self.duty:g} with drive.kind = '{kind}'; allowed: only for 'dc-motor'")
+        if self.polarity != "forward" and kind != "torque-speed":
+            found.append("drive.polarity = 'reverse'; allowed: only with drive.kind = 'torque-speed'")
+        for name, owner in _OF_ONE_KIND.items():
+            given = getattr(self, name) is not None
+            if given != (kind == owner):
+                found.append(
+                    f"drive.{name} is {'set' if given else 'missing'} with drive.kind = '{kind}'; "
+                    f"allowed: drive.{name} exactly when drive.kind = '{owner}'"
+                )
+        if kind != "torque-speed" or self.rates is None or self.torques is None:
+            return found
         if len(self.rates) != len(self.torques) or not 2 <= len(self.rates) <= MOST_POINTS:
             return [
-                *problems,
+                *found,
                 f"drive.rates has {len(self.rates)} and drive.torques has {len(self.torques)} values; allowed: as many "
                 f"of both, from 2 to {MOST_POINTS}",
             ]
         if self.rates[0] != 0.0 or any(b <= a for a, b in pairwise(self.rates)):
-            problems.append("drive.rates must increase from 0; allowed: such as ['0 Hz', '170 Hz', '300 Hz']")
+            found.append("drive.rates must increase from 0; allowed: such as ['0 Hz', '170 Hz', '300 Hz']")
         if self.torques[0] <= 0.0 or self.torques[-1] != 0.0 or any(b > a for a, b in pairwise(self.torques)):
-            problems.append(
+            found.append(
                 "drive.torques must fall, or stay, from a positive stall torque to 0 at the last rate; "
                 "allowed: such as ['0.3 mN m', '0.28 mN m', '0 N m']"
             )
-        return problems
+        return found
+
+
+_JOINTS = {"dc-motor": "revolute", "torque-speed": "revolute", "magnetic": "fixed"}
+"""The joint of drives that have only one."""
+_OF_ONE_KIND = {"rates": "torque-speed", "torques": "torque-speed", "rate": "rate", "torque": "torque"}
+"""Fields that one kind of drive needs and no other has."""
 
 
 class MotorResistance(Section):
@@ -333,30 +340,13 @@ class RobotTables(Section):
         drive = self.drive
         if drive is None:
             return []
-        problems = []
+        problems = drive.problems()
         if drive.kind == "dc-motor":
-            if drive.joint == "fixed":
-                problems.append("drive.joint = 'fixed' with drive.kind = 'dc-motor'; allowed: 'revolute'")
             absent = [table for table in ("motor", "battery") if getattr(self, table) is None]
             problems += [f"{table} is missing; drive.kind = 'dc-motor' needs a [{table}] table" for table in absent]
-        elif drive.duty != 1.0:
+        if (drive.kind == "magnetic") != (self.magnetic is not None):
             problems.append(
-                f"drive.duty = {drive.duty:g} with drive.kind = '{drive.kind}'; allowed: only for 'dc-motor'"
-            )
-        problems += drive.curve_problems()
-        magnetic = drive.kind == "magnetic"
-        if magnetic and drive.joint == "revolute":
-            problems.append("drive.joint = 'revolute' with drive.kind = 'magnetic'; allowed: 'fixed'")
-        if magnetic != (self.magnetic is not None):
-            problems.append(
-                f"magnetic is {'missing' if magnetic else 'set'} with drive.kind = '{drive.kind}'; "
+                f"magnetic is {'set' if self.magnetic else 'missing'} with drive.kind = '{drive.kind}'; "
                 "allowed: a [magnetic] table exactly when drive.kind = 'magnetic'"
             )
-        for kind in ("rate", "torque"):
-            given = getattr(drive, kind) is not None
-            if given != (drive.kind == kind):
-                problems.append(
-                    f"drive.{kind} is {'set' if given else 'missing'} with drive.kind = '{drive.kind}'; "
-                    f"allowed: drive.{kind} exactly when drive.kind = '{kind}'"
-                )
         return problems

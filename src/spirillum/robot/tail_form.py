@@ -73,13 +73,13 @@ class TailForm(NamedTuple):
 
     def amplitude_at(self, share: Values) -> tuple[Values, Values]:
         """Local over largest amplitude at shares of the length, and its derivative by the share."""
-        line, slope, _ = _along(self.amplitude)
+        line, slope, _ = along_points(self.amplitude)
         top = max(value for _, value in self.amplitude)
         return line(share) / top, slope(share) / top
 
     def wavenumber_at(self, share: Values) -> tuple[Values, Values]:
         """Local over mean wavenumber at shares of the length, and its integral from the root."""
-        rate, _, whole = _along(self.wavelength, inverse=True)
+        rate, _, whole = along_points(self.wavelength, inverse=True)
         return rate(share) / whole(1.0), whole(share) / whole(1.0)
 
     def widths(self, amplitude: Values, wavelength: Values) -> tuple[Values, Values]:
@@ -107,7 +107,7 @@ PLAIN = TailForm()
 
 
 @lru_cache(maxsize=64)
-def _along(points: Along, *, inverse: bool = False) -> tuple[Any, Any, Any]:
+def along_points(points: Along, *, inverse: bool = False) -> tuple[Any, Any, Any]:
     """Monotone interpolation of factors, its derivative and integral; of their inverses by many points."""
     from scipy.interpolate import PchipInterpolator
 
@@ -117,11 +117,6 @@ def _along(points: Along, *, inverse: bool = False) -> tuple[Any, Any, Any]:
         fine = np.union1d(share, np.linspace(0.0, 1.0, 257))
         line = PchipInterpolator(fine, 1.0 / line(fine))
     return line, line.derivative(), line.antiderivative()
-
-
-def mean_of_inverse(points: Along) -> float:
-    """Mean of the inverse of a factor along the tail."""
-    return float(_along(points, inverse=True)[2](1.0))
 
 
 class CentreLine:
@@ -158,7 +153,11 @@ class CentreLine:
         """Largest axial distance from the root, m."""
         self.nearest = float(np.min(self.samples[:, 0]))
         """Smallest axial distance from the root, m."""
-        self.winding, self.turns = _turns(first / speed[:, None])
+        tangents = first / speed[:, None]
+        across = tangents[:, 1] + 1j * tangents[:, 2]
+        winding = float(np.sum(np.angle(across[1:] * np.conj(across[:-1]), deg=False)) / (2.0 * np.pi))
+        flat = float(np.sum(np.abs(np.diff(across))) / (2.0 * np.pi * max(np.max(np.abs(across)), 1e-12)))
+        self.winding, self.turns = winding, max(abs(winding) if flat > 0.5 * abs(winding) else 0.0, flat, 0.25)
 
     def shares(self, count: float) -> Samples:
         """At least so many parameters, those between which it is a cubic among them."""
@@ -170,14 +169,6 @@ class CentreLine:
     def at(self, share: Values) -> tuple[Values, Values]:
         """Points (..., 3), m, and derivatives by the parameter."""
         return self._spline(share), self._spline(share, 1)
-
-
-def _turns(tangents: Samples) -> tuple[float, float]:
-    """Turns of the tangent about the axis with their sign, and number of turns: for a flat wave those of a helix."""
-    across = tangents[:, 1] + 1j * tangents[:, 2]
-    winding = float(np.sum(np.angle(across[1:] * np.conj(across[:-1]), deg=False)) / (2.0 * np.pi))
-    flat = float(np.sum(np.abs(np.diff(across))) / (2.0 * np.pi * max(np.max(np.abs(across)), 1e-12)))
-    return winding, max(abs(winding) if flat > 0.5 * abs(winding) else 0.0, flat, 0.25)
 
 
 @lru_cache(maxsize=64)

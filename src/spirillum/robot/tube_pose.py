@@ -238,7 +238,7 @@ def largest_gap(outline: Outline, radius: float, pitch: float = 0.0, yaw: float 
 def _offset(outline: Outline, radius: float, gap: float, pitch: float, yaw: float) -> float:
     """Offset e of `TubePose.at_gap`, m."""
     if pitch == 0 and yaw == 0:
-        e = radius - _largest_radius(outline) - gap
+        e = radius + TubePose(0.0, 0.0).clearance(outline) - gap  # in a tube without radius less the largest one
         return float(e) if e >= -1e-12 * radius else np.nan
     from scipy.optimize import brentq
 
@@ -266,11 +266,6 @@ def _centred(outline: Outline, radius: float, pitch: float, yaw: float) -> float
         options={"xatol": 1e-9 * radius},
     )
     return float(found.x)
-
-
-def _largest_radius(outline: Outline) -> float:
-    """Largest radius a of a solid of revolution, m; where it is reached does not matter in a level tube."""
-    return -TubePose(0.0, 0.0).clearance(outline)
 
 
 def contact_pitch(

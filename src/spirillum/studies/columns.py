@@ -147,18 +147,6 @@ def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
     return found
 
 
-def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str, Values]:
-    """`gap_at_place` and `pitch_at_place` of every robot, (robots, poses), m and rad; NaN where it has no band."""
-    tasks = [task for task, _ in answers]
-    poses = max(task.pose for task in tasks) + 1
-    names = ("gap_at_place", "pitch_at_place")
-    found: dict[str, Values] = {name: np.full((count, poses), np.nan) for name in names}
-    for task in tasks:
-        found["gap_at_place"][task.indices, task.pose] = task.robots[0].placement.gap
-        found["pitch_at_place"][task.indices, task.pose] = task.robots[0].placement.pitch
-    return found
-
-
 def with_band(
     flat: dict[str, Values], answers: Iterable[tuple[BandTask, Part]], models: tuple[str, ...]
 ) -> dict[str, Values]:

@@ -17,7 +17,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.limits import broken, caution_code
-from spirillum.studies.columns import BandTask, HeldTask, TrialTask, column_variables, placed_at, with_band
+from spirillum.studies.columns import BandTask, HeldTask, TrialTask, column_variables, with_band
 from spirillum.studies.released_robots import (
     AT_RUNS,
     FACTORS,
@@ -134,22 +134,6 @@ class BesideModels(NamedTuple):
 _NOTHING_BESIDE = BesideModels()
 
 
-def assembled(
-    loaded: LoadedStudy,
-    answers: Iterable[tuple[ModelTask, Part]],
-    band: Sequence[tuple[BandTask, Part]],
-    beside: BesideModels,
-    observed: ObservedArrays | None,
-    fingerprint: str,
-    warnings: Sequence[Note],
-) -> xr.Dataset:
-    """Collect all answers in one Dataset: at the reference pose, at the poses of a band, of robots one by one."""
-    dataset = laid_out(loaded, answers, band, beside, observed)
-    dataset.attrs = described(loaded, observed, fingerprint, warnings)
-    dataset.attrs["checksum"] = _checksum(dataset)
-    return dataset
-
-
 def described(
     loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, warnings: Sequence[Note]
 ) -> dict[str, str]:
@@ -194,7 +178,14 @@ def laid_out(
         more = ("place" if name.endswith("_at_place") else "assumed_motor_rate",)[: axis_last.ndim - 3]
         data[name] = ((*robots, "model", "friction", *more), moved, _attributes_of(name))
     if band:
-        for name, values in placed_at(band, count).items():
+        tasks = [task for task, _ in band]
+        poses = max(task.pose for task in tasks) + 1
+        names = ("gap_at_place", "pitch_at_place")
+        found: dict[str, Values] = {name: np.full((count, poses), np.nan) for name in names}
+        for task in tasks:
+            found["gap_at_place"][task.indices, task.pose] = task.robots[0].placement.gap
+            found["pitch_at_place"][task.indices, task.pose] = task.robots[0].placement.pitch
+        for name, values in found.items():
             data[name] = ((*robots, "place"), values.reshape(*shape, -1), _PLACED[name])
     data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes_of("outside"))
     if observed is not None:
@@ -213,7 +204,7 @@ _ANY = "surrogatepass"
 """Damaged names are summed, too."""
 
 
-def _checksum(dataset: xr.Dataset) -> str:
+def checksum_of(dataset: xr.Dataset) -> str:
     """Checksum of all other values and attributes: damage is detected, and the dataset computed again."""
     found = hashlib.sha256()
     for name, value in sorted((str(name), value) for name, value in dataset.attrs.items() if name != "checksum"):
@@ -332,7 +323,7 @@ def read_dataset(path: Path, robots: int) -> xr.Dataset | None:
         found = loaded_netcdf(path, "a dataset of this study", _LARGEST_LEFT + _LARGEST_OF_A_ROBOT * robots)
     except InputError:
         return None
-    return found if found.attrs.get("checksum") == _checksum(found) else None
+    return found if found.attrs.get("checksum") == checksum_of(found) else None
 
 
 class Caution(NamedTuple):

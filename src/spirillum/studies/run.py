@@ -24,7 +24,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.columns import BandTask, HeldTask, band_tasks, held_tasks, left_out, trial_notes, trial_tasks
-from spirillum.studies.dataset import BesideModels, assembled, cautions, summed
+from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, laid_out, summed
 from spirillum.studies.released_robots import not_settled, release_tasks, settled_basis, settled_tasks, without_answer
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
@@ -46,7 +46,10 @@ def kept(task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part
         return None
     try:
         with opened(folder / task.file_name, "a part of a study", _LARGEST_PART) as stream:
-            if any(not _as_kept(item) for item in zipfile.ZipFile(stream).infolist()):
+            if any(
+                not (item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size)
+                for item in zipfile.ZipFile(stream).infolist()
+            ):
                 return None
             with np.load(stream, allow_pickle=False) as stored:
                 part = {name: stored[name] for name in stored.files}
@@ -58,11 +61,6 @@ def kept(task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part
 
 
 _LARGEST_PART = 1 << 30
-
-
-def _as_kept(item: zipfile.ZipInfo) -> bool:
-    """Whether an array is stored uncompressed: what is compressed could be a thousand times as large."""
-    return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
 
 
 def keep(task: StudyTask, part: Part, folder: Path | None) -> None:
@@ -104,7 +102,11 @@ def computed_study(
     missing = [task for task in requested if found[task.number] is None]
     done = len(requested) - len(missing)
     if missing:
-        _announce_solved(missing, tell)
+        walled = (task for task in missing if isinstance(task, ModelTask) and find_swimmer_model(task.model).placed)
+        count = sum(len(missing_tables(task.batch, "straight")) for task in walled)
+        if count:
+            words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
+            tell(f"{ESTIMATE}{words}, in some 10 s of one core each, up to 64 at a time; `prepare` makes tables", 0, 0)
         tell(missing[0].words, done, len(requested))
     jobs = (task.job(loaded, observed) for task in missing)
     at_work = _worth(missing, pool or WorkerPool())
@@ -134,16 +136,10 @@ def computed_study(
     warnings += not_settled(beside.settled)
     warnings += trial_notes(beside.trials)
     warnings += warnings_of_calibrations(loaded)
-    return assembled(loaded, answers, band, beside, observed, fingerprint, list(dict.fromkeys(warnings)))
-
-
-def _announce_solved(missing: Sequence[StudyTask], tell: Progress) -> None:
-    """Tell beforehand that the flow is solved for around robots without a table, a block of them at a time."""
-    walled = (task for task in missing if isinstance(task, ModelTask) and find_swimmer_model(task.model).placed)
-    count = sum(len(missing_tables(task.batch, "straight")) for task in walled)
-    if count:
-        words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
-        tell(f"{ESTIMATE}{words}, in some 10 s of one core each, up to 64 at a time; `prepare` makes tables", 0, 0)
+    dataset = laid_out(loaded, answers, band, beside, observed)
+    dataset.attrs = described(loaded, observed, fingerprint, list(dict.fromkeys(warnings)))
+    dataset.attrs["checksum"] = checksum_of(dataset)
+    return dataset
 
 
 _KEPT = "; what was answered is kept"

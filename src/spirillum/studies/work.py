@@ -237,7 +237,13 @@ class ModelTask(OneModel):
             found = [_swum(quick, r, tail, motor) for r in readings]
             part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
         if study.assumed_motor_rates and self.batch.electrics is not None:
-            part |= _at_assumed_rates(self, quick, study.assumed_motor_rates, readings)
+            electrics = self.batch.electrics
+            assert electrics is not None  # noqa: S101 - checked by the caller
+            driven = np.outer(study.assumed_motor_rates, np.broadcast_to(electrics.polarity, (self.batch.size,)))
+            curves = [_curve(quick, reading, driven) for reading in readings]
+            part |= {
+                f"{name}_at_assumed_rate": np.stack([curve[name] for curve in curves], axis=1) for name in AT_RATES
+            }
         return part
 
 
@@ -371,15 +377,6 @@ def _intervals(task: ModelTask, loaded: LoadedStudy, posterior: PosteriorFile) -
 
 def _stacked(results: Sequence[Swimming], name: str) -> Values:
     return np.stack([getattr(result, name) for result in results], axis=-1)
-
-
-def _at_assumed_rates(task: ModelTask, quick: QuickParts, rates: Sequence[float], readings: Sequence[str]) -> Part:
-    """Steady swimming along a curve of assumed motor rates, signed as each motor drives."""
-    electrics = task.batch.electrics
-    assert electrics is not None  # noqa: S101 - checked by the caller
-    driven = np.outer(rates, np.broadcast_to(electrics.polarity, (task.batch.size,)))
-    curves = [_curve(quick, reading, driven) for reading in readings]
-    return {f"{name}_at_assumed_rate": np.stack([curve[name] for curve in curves], axis=1) for name in AT_RATES}
 
 
 def _curve(quick: QuickParts, reading: str, driven: Values) -> Part:

@@ -147,11 +147,6 @@ def drive_warnings(
     return found + _prescribed_rate_warnings(robot, reading, result)
 
 
-def _against_the_drive(robot: Robot, result: Swimming) -> bool:
-    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
-    return float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0
-
-
 def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note]:
     if reading == "none":
         words = "friction 'none' leaves out that of the motor: rates and speeds are upper bounds; use 'rotor'"
@@ -172,7 +167,8 @@ def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Sw
         if robot.friction.effective is not None:
             words = "friction.effective is ignored: with a tail rate it is inferred from (17) and (18)"
             found.append(Note("friction-ignored", words, ("friction.effective",)))
-        if _against_the_drive(robot, result):
+        reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+        if float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0:
             words = "the tail turns against its motor: the inferred friction has no meaning; check the rate's sign"
             found.append(Note("tail-against-motor", words, ("motor.polarity", "tail.handedness", "effective_friction")))
         elif result.effective_friction[0] < 0:

@@ -62,14 +62,6 @@ def _rows(motor: Electrics, *more: Values) -> tuple[Samples, tuple[int, ...]]:
     return rows.reshape(-1, len(columns)), shape
 
 
-def torque_on_curve(curve: TorqueCurve, coasting: Values, per_torque: Values, duty: float = 1.0) -> Values:
-    """Torque of a motor with a curve, N m, in its own sense, by its rate without a torque and the rate per torque."""
-    rates, slopes = np.broadcast_arrays(coasting, per_torque)
-    found = np.empty(rates.size)
-    curve_torques(packed_curve(curve), rates.ravel(), slopes.ravel(), duty, found)
-    return found.reshape(rates.shape)
-
-
 def packed_curve(curve: TorqueCurve) -> Samples:
     """A curve as C takes it, (25,)."""
     found = np.zeros(1 + 2 * MOST_POINTS)
@@ -126,7 +118,10 @@ def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> Dr
     elif batch.curve is not None:
         sense, current = batch.curve.sense * batch.hand, none
         slip, coasting = tail_per_torque - body_per_torque, sense * (tail_coasting - body_coasting)
-        torque = sense * torque_on_curve(batch.curve, coasting, slip)
+        rates, slopes = np.broadcast_arrays(coasting, slip)
+        found = np.empty(rates.size)
+        curve_torques(packed_curve(batch.curve), rates.ravel(), slopes.ravel(), 1.0, found)
+        torque = sense * found.reshape(rates.shape)
     elif batch.drive == "dc-motor" and batch.electrics is not None:
         motor = batch.electrics
         slip = tail_per_torque - body_per_torque
@@ -208,24 +203,14 @@ def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> Drive
     load, flow = s.bb + s.br + s.rb + s.rr, s.t_b + s.t_r
     none = np.full(1, np.nan)
     if batch.drive == "magnetic" and np.all(np.isnan(tail_rate)):
-        step_out, lag, rate = _in_rotating_field(batch, load, flow)
+        strength = batch.magnetic_moment * np.sin(batch.moment_angle) * batch.magnetic_field
+        wanted = batch.field_rate - flow / load  # what the field has to drive beyond the flow's own turning
+        step_out = strength / load
+        follows = np.abs(wanted) <= step_out
+        lag = np.where(follows, np.arcsin(np.where(follows, np.abs(wanted) / step_out, 0.0)), np.nan)
+        slipping = wanted - np.sign(wanted) * np.sqrt(np.where(follows, 0.0, wanted**2 - step_out**2))
+        rate = np.where(follows, wanted, slipping) + flow / load
         return DriveState(rate, rate, none, none, FRICTIONLESS, none, step_out, lag, batch.field_rate)
     own = batch.drive_rate if batch.drive == "rate" else (batch.drive_torque + flow) / load
     rate = np.where(np.isnan(tail_rate), own, tail_rate)
     return DriveState(rate, rate, none, none, FRICTIONLESS, none)
-
-
-def _in_rotating_field(batch: RobotBatch, load: PerRobot, flow: PerRobot) -> tuple[PerRobot, PerRobot, PerRobot]:
-    """Step-out rate, phase lag and mean rate of a robot constrained to the axis about which the field turns.
-
-    The moment's part across the axis, m sin(moment_angle), lags behind the field by an angle with
-    m B sin(lag) = load * rate. Beyond step-out the lag grows without end, d(lag)/dt = rate - step_out sin(lag), and
-    the robot turns at rate - sqrt(rate^2 - step_out^2) on average (R. Adler, Proc. IRE 34:351, 1946).
-    """
-    strength = batch.magnetic_moment * np.sin(batch.moment_angle) * batch.magnetic_field
-    wanted = batch.field_rate - flow / load  # what the field has to drive beyond the flow's own turning
-    step_out = strength / load
-    follows = np.abs(wanted) <= step_out
-    lag = np.where(follows, np.arcsin(np.where(follows, np.abs(wanted) / step_out, 0.0)), np.nan)
-    slipping = wanted - np.sign(wanted) * np.sqrt(np.where(follows, 0.0, wanted**2 - step_out**2))
-    return step_out, lag, np.where(follows, wanted, slipping) + flow / load

@@ -20,7 +20,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, tabled
-from spirillum.robot.batch import CalibrationFactors, Electrics, RobotBatch
+from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import friction_torques
@@ -31,7 +31,7 @@ from spirillum.swimming.drawn_resistance import (
     chebyshev_points,
     sampled_discrepancy,
 )
-from spirillum.swimming.drives import battery_voltage, run_time, steady_current
+from spirillum.swimming.drives import battery_voltage, current_at, run_time, steady_current
 from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import LEVEL, STEADY, Intervals, Swimming, friction_reading
@@ -231,7 +231,13 @@ def _with_discrepancy(
     with np.errstate(divide="ignore", invalid="ignore"):
         if batch.joint != "fixed":
             values |= _torques_and_powers(swum, values, batch, pace, own_drive=own_drive, friction=friction)
-        return values | _over_speed(swum, values, speed)
+        shaft, electrical = (values[name] / getattr(swum, name) for name in ("shaft_power", "electrical_power"))
+        spent = np.where(np.isnan(electrical), shaft, electrical)
+        return values | {
+            "hydrodynamic_efficiency": swum.hydrodynamic_efficiency * speed**2 / shaft,
+            "overall_efficiency": swum.overall_efficiency * speed**2 / electrical,
+            "cost_of_transport": swum.cost_of_transport * spent / np.abs(speed),
+        }
 
 
 def _pace_at(swum: Swimming, batch: RobotBatch, turning: Samples) -> Samples:
@@ -247,19 +253,12 @@ def _pace_at(swum: Swimming, batch: RobotBatch, turning: Samples) -> Samples:
     tail, slip = swum.tail_rotation_rate, swum.motor_rotation_rate
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1.0 - turning * swum.body_rotation_rate / tail  # of the joint's rate in the tail's
-        rest = motor.joint_torque_constant * _current_at(motor, slip) - swum.drive_torque
+        rest = motor.joint_torque_constant * current_at(motor, slip) - swum.drive_torque
         load = swum.drive_torque / tail / share + rest / slip
         across = motor.joint_back_emf_constant * motor.joint_torque_constant / load
         found = motor.polarity * steady_current(motor, np.zeros_like(load), across) * motor.joint_torque_constant / load
         pace = found / share / tail
     return np.where(np.isfinite(pace), pace, 1.0)
-
-
-def _current_at(motor: Electrics, slip: Samples) -> Samples:
-    """Current of (17) at a rate of the joint, A, signed as the rate that it drives."""
-    emf = motor.joint_back_emf_constant * motor.polarity * slip
-    found: Samples = motor.polarity * steady_current(motor, emf, np.zeros(1))
-    return found
 
 
 def _torques_and_powers(
@@ -278,7 +277,7 @@ def _torques_and_powers(
     effective, motor = swum.effective_friction, batch.electrics
     rotor = motor.joint_rotor_friction if motor is not None else np.zeros(1)
     if motor is not None and batch.drive == "dc-motor":
-        current = _current_at(motor, slip)
+        current = current_at(motor, slip)
         voltage = battery_voltage(motor, current)
         found |= {
             "motor_current": current,
@@ -293,14 +292,3 @@ def _torques_and_powers(
             found["motor_residual_torque"] = spare - (rotor * slip if friction == "body" else 0.0)
     torques = friction_torques(friction_reading(friction), effective, rotor)
     return found | {"effective_friction": effective, "friction_power": torques.power(body, tail)}
-
-
-def _over_speed(swum: Swimming, values: dict[str, Samples], speed: Samples) -> dict[str, Samples]:
-    """Efficiencies and the cost of transport: powers over powers, or over weight times speed."""
-    shaft, electrical = (values[name] / getattr(swum, name) for name in ("shaft_power", "electrical_power"))
-    spent = np.where(np.isnan(electrical), shaft, electrical)
-    return {
-        "hydrodynamic_efficiency": swum.hydrodynamic_efficiency * speed**2 / shaft,
-        "overall_efficiency": swum.overall_efficiency * speed**2 / electrical,
-        "cost_of_transport": swum.cost_of_transport * spent / np.abs(speed),
-    }

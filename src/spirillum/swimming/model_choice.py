@@ -50,7 +50,10 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
     """The named model, or with `auto` that of a fit, else the one with the walls of the robot's channel."""
     if asked != AUTO:
         return ModelChoice(find_swimmer_model(asked, AUTO).name)
-    fitted = _fitted_choice(fit)
+    names = fit.models
+    if len(names) > 1:
+        raise InputError(f"{fit.name} holds factors for models {', '.join(names)}; allowed: --model with one of them")
+    fitted = ModelChoice(names[0], fitted_with(fit.name), fitted=True) if names else None
     if fitted is not None:
         return fitted
     if robot.channel is None:
@@ -88,10 +91,3 @@ def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:
     from spirillum.fluid.tube.library import find_table  # loads compiled loops, which few models need
 
     return find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0]), stage) is not None
-
-
-def _fitted_choice(fit: Fit) -> ModelChoice | None:
-    names = fit.models
-    if len(names) > 1:
-        raise InputError(f"{fit.name} holds factors for models {', '.join(names)}; allowed: --model with one of them")
-    return ModelChoice(names[0], fitted_with(fit.name), fitted=True) if names else None

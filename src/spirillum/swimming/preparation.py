@@ -232,7 +232,7 @@ def prepare_all(
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
     chosen = stage_of(stage)
     loaded = [load(robot) for robot in robots]
-    asked = _all_checked(loaded)
+    asked = checked_geometries(loaded)
     if any(find_table(*robot, chosen) is None for robot in asked):
         check_cache_folder()
         if not tables_are_kept():
@@ -244,14 +244,8 @@ def prepare_all(
     return tuple(Prepared(robot, table) for robot, table in zip(loaded, tables, strict=True))
 
 
-def passing_tables(
-    robots: Sequence[Robot], *, progress: Callable[[str, int, int], None] | None = None
-) -> list[TubeTable]:
-    """Return tables without yaw for this request, also where they cannot be kept; see `prepare_all`."""
-    return prepared_tables(_all_checked(robots), stage="straight", workers=1, progress=progress)
-
-
-def _all_checked(robots: Sequence[Robot]) -> list[tuple[RobotGeometry, float]]:
+def checked_geometries(robots: Sequence[Robot]) -> list[tuple[RobotGeometry, float]]:
+    """What decides the tables of robots that have one."""
     return [_checked(robot, several=len(robots) > 1) for robot in robots]
 
 

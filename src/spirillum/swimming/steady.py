@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.argument_validation import number_array
 from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, interval, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
@@ -121,9 +121,7 @@ class Intervals:
 
     def of(self, name: str) -> dict[str, Any]:
         """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
-        if not np.isfinite(self.low[name]):
-            return {}
-        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
+        return interval(self.low[name], self.high[name], LEVEL)
 
 
 _MORE = ("wobble_angle", "path_radius", "step_out_rate", "phase_lag", "plug_velocity")
@@ -355,6 +353,7 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         voltage = battery_voltage(motor, current)
         electrical = motor.duty * motor.polarity * current * voltage
         lasting = run_time(motor, current)
+    wire = 0.25 * np.pi * batch.wire_diameter**2 * batch.arc_length
     values = {
         "forward_velocity": speed,
         "advance_per_radian": np.where(tail_rate == 0, np.nan, speed / tail_rate),
@@ -374,7 +373,8 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         "hydrodynamic_efficiency": towing / shaft,
         "propulsive_power": towing,
         "overall_efficiency": towing / electrical,
-        "cost_of_transport": np.where(np.isnan(electrical), shaft, electrical) / (_weight(batch) * np.abs(speed)),
+        "cost_of_transport": np.where(np.isnan(electrical), shaft, electrical)
+        / (STANDARD_GRAVITY * (batch.body_mass + batch.tail_density * wire) * np.abs(speed)),
         "reynolds_number": body_reynolds(batch, speed),
         "tail_reynolds_number": tail_reynolds(batch, tail_rate),
         "battery_run_time": lasting,
@@ -393,12 +393,6 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},
         valid=np.array(np.broadcast_to(moving, (size,))),
     )
-
-
-def _weight(batch: RobotBatch) -> PerRobot:
-    """Weight of the whole robot in vacuum, N; NaN where its masses are not known."""
-    wire = 0.25 * np.pi * batch.wire_diameter**2 * batch.arc_length
-    return STANDARD_GRAVITY * (batch.body_mass + batch.tail_density * wire)
 
 
 def _plug_velocity(mean_flow: MeanFlow, speed: PerRobot, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:

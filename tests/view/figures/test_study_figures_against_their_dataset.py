@@ -283,11 +283,13 @@ def test_drawing_leaves_the_callers_settings_alone(paper_study: Any, tmp_path: P
 @pytest.mark.usefixtures("unplaced")
 def test_files_come_out_the_same_every_time(paper_study: Any, tmp_path: Path) -> None:
     picture = figures_of(paper_study.isel(wavelength=[3]))["bound"]
-    first, second = (save(picture.figure(), tmp_path / name) for name in ("one", "two"))
+    first, second = (save(picture.figure(), tmp_path / name, vector=True) for name in ("one", "two"))
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.png", "one.svg", "two.png", "two.svg"]
     assert "<text" not in first[1].read_text()
+    assert save(picture.figure(), tmp_path / "one") == [tmp_path / "one.png"]
+    assert not (tmp_path / "one.svg").exists()  # of an earlier figure
 
 
 def test_cut_names_of_robots_still_differ() -> None:

@@ -180,7 +180,13 @@ def _wire_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
     columns = {name: column[:, None] for name, column in columns.items()}
     line = centreline(fraction * columns["length"], form=b.form, **columns)
     ds = weight * columns["length"] * (line.stretch if _has_true_arc(b) else 1.0 / b.arc_fraction[:, None])
-    local = _local_matrix(batch, line.tangent)
+    c = local_coefficients(batch)
+    normal, tangential = c.normal[:, None, None, None], c.tangential[:, None, None, None]
+    local: Tensors = normal * np.eye(3) + (tangential - normal) * _outer(line.tangent)
+    if c.floor_normal is not None:
+        up = np.array([0.0, 0.0, 1.0]) - line.tangent[..., 2:] * line.tangent
+        across = up / np.linalg.norm(up, axis=-1, keepdims=True)
+        local = local + (c.floor_normal[:, None, None, None] - normal) * _outer(across)
     arm = skew(line.position)
     upper = np.concatenate([local, -local @ arm], axis=-1)
     lower = arm @ upper
@@ -211,18 +217,6 @@ def _along_the_wire(batch: RobotBatch) -> tuple[Values, Values]:
 
 def _outer(vector: Vectors) -> Tensors:
     return vector[..., :, None] * vector[..., None, :]
-
-
-def _local_matrix(batch: RobotBatch, tangent: Vectors) -> Tensors:
-    """R C R' of eq. (12): force per arc length and velocity, in body axes."""
-    c = local_coefficients(batch)
-    normal, tangential = c.normal[:, None, None, None], c.tangential[:, None, None, None]
-    local: Tensors = normal * np.eye(3) + (tangential - normal) * _outer(tangent)
-    if c.floor_normal is not None:
-        up = np.array([0.0, 0.0, 1.0]) - tangent[..., 2:] * tangent
-        across = up / np.linalg.norm(up, axis=-1, keepdims=True)
-        local = local + (c.floor_normal[:, None, None, None] - normal) * _outer(across)
-    return local
 
 
 def _spin_coefficient(batch: RobotBatch) -> PerRobot:

@@ -136,7 +136,10 @@ class _Link:
     def of(cls, solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float) -> _Link:
         turned = [(_turned(wire), part) for wire, part in wires]
         system = wire_system(turned, solids.fineness.wire)
-        lines = tuple(_lowered(wire, drop) for wire, _ in turned)
+        lines = tuple(
+            Wire(wire.points - np.array([0.0, drop, 0.0]), wire.tangents, wire.lengths, wire.radius)
+            for wire, _ in turned
+        )
         points = np.concatenate([wire.points for wire in lines])
         pose, forces = solids.pose, 3 * len(points)
         placed = pose.placed(points)
@@ -221,7 +224,3 @@ def _turned(wire: Wire) -> Wire:
     """In the axes used here: (x, y, z) of the body are (x, -z, y)."""
     swap = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     return Wire(wire.points @ swap.T, wire.tangents @ swap.T, wire.lengths, wire.radius)
-
-
-def _lowered(wire: Wire, drop: float) -> Wire:
-    return Wire(wire.points - np.array([0.0, drop, 0.0]), wire.tangents, wire.lengths, wire.radius)

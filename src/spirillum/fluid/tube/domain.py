@@ -97,7 +97,9 @@ def pose_limits(
     through = f"the tail would pass through the wall ({fields})"
     resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
-    turned = _turned(batch)
+    angles = {"pitch": batch.placement.pitch, "yaw": batch.placement.yaw}
+    said = [f"placement.{name} = {show(angle, 'deg')}" for name, angle in angles.items() if angle]
+    turned = f" ({', '.join(said)})" if said else ""
     share = batch.pose.eccentricity
     gap = "placement.gap" if share is None else f"placement.eccentricity = {share:g}: gap"
     open_ended = batch.placement.ends == "open"
@@ -169,12 +171,6 @@ def pose_limits(
             "tail-in-wall",
         ),
     ]
-
-
-def _turned(batch: RobotBatch) -> str:
-    angles = {"pitch": batch.placement.pitch, "yaw": batch.placement.yaw}
-    said = [f"placement.{name} = {show(angle, 'deg')}" for name, angle in angles.items() if angle]
-    return f" ({', '.join(said)})" if said else ""
 
 
 def _films(batch: RobotBatch, part: str, kept: Sequence[Limit], thinnest_gap: float) -> _Films:

@@ -76,7 +76,10 @@ class Reduced:
     def of(cls, solids: Solids, tails: Sequence[Sources]) -> list[Reduced]:
         """The basis of wires that turn about the solids' axis, for each of some tails."""
         sources = Sources.joined(tails)
-        pose, placed = solids.pose, solids.pose.placed(_swept(sources))
+        times = max(2, -(-_SNAPSHOTS // len(sources.x)))
+        x, rho = np.tile(sources.x, times), np.tile(sources.rho, times)
+        theta = _GOLDEN * np.arange(len(x))
+        pose, placed = solids.pose, solids.pose.placed(np.stack([x, rho * np.cos(theta), rho * np.sin(theta)], axis=1))
         away = float(np.min(pose.distances(sources.x, sources.rho)))
         along = pose.rotation[0, 0]
         beside = sources.rho * np.sqrt(1.0 - along**2)
@@ -96,7 +99,9 @@ class Reduced:
             fields = [
                 np.tensordot(values[number], gather, axes=1).astype(solids.fineness.precision) for values in received
             ]
-            found.append(_answers(solids, number, crossing, _sizes(sources), wall, fields))
+            blob = np.concatenate([np.full((len(wire.points), 3), wire.blob) for wire in sources.wires])
+            sizes = np.concatenate([np.ones_like(blob), blob], axis=1)
+            found.append(_answers(solids, number, crossing, sizes, wall, fields))
         edges = np.cumsum([0, *(tail.x.size for tail in tails)]).tolist()
         return [
             cls(tail, waves, solids.gap, tuple(answers.only(low, high, sources.x.size) for answers in found))
@@ -140,14 +145,6 @@ class Reduced:
 
         shares = summed(reflected, self.waves.k.size)
         return [sum(some)[:, back] for some in zip(*shares, strict=True)]
-
-
-def _swept(sources: Sources) -> Samples:
-    """Points on what the wires sweep in a turn, in the robot's axes, (n, 3)."""
-    times = max(2, -(-_SNAPSHOTS // len(sources.x)))
-    x, rho = np.tile(sources.x, times), np.tile(sources.rho, times)
-    theta = _GOLDEN * np.arange(len(x))
-    return np.stack([x, rho * np.cos(theta), rho * np.sin(theta)], axis=1)
 
 
 def _unbounded(solids: Solids, sources: Sources) -> list[Samples]:
@@ -205,12 +202,6 @@ def _mixing(size: int, columns: int, seed: int = 0) -> Samples:
         return np.eye(size)
     mixed: Samples = np.random.default_rng(seed).standard_normal((size, columns)) / np.sqrt(columns)
     return mixed
-
-
-def _sizes(sources: Sources) -> Samples:
-    """Forces and torques of ring sources that move the fluid alike at a blob radius, (stations, 6)."""
-    blob = np.concatenate([np.full((len(wire.points), 3), wire.blob) for wire in sources.wires])
-    return np.concatenate([np.ones_like(blob), blob], axis=1)
 
 
 def _duals(system: System) -> Samples:

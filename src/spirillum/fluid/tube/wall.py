@@ -184,12 +184,6 @@ def point_waves(
     return out.reshape(*out.shape[:4], -1)
 
 
-def components_of(points: np.ndarray) -> np.ndarray:
-    """Rows of the three components of some points."""
-    rows: np.ndarray = (3 * points[:, None] + np.arange(3)).ravel()
-    return rows
-
-
 def distances_of(points: Samples, radius: float) -> Samples:
     """Distances of points from the wall, (n,), m."""
     distances: Samples = radius - np.hypot(points[:, 1], points[:, 2])
@@ -203,7 +197,8 @@ def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.
     """
     distances = distances_of(points, radius)
     order = np.argsort(distances, kind="stable")
-    return points[order], distances[order], components_of(np.argsort(order))
+    rows: np.ndarray = (3 * np.argsort(order)[:, None] + np.arange(3)).ravel()
+    return points[order], distances[order], rows
 
 
 def point_reflection(points: Samples, waves: WallWaves, precision: type[np.floating] = np.float64) -> Samples:

@@ -44,12 +44,6 @@ _CHECKS = {  # what differs most from each: the form of the wire, and the spacin
 }
 
 
-def stations_of(batch: RobotBatch) -> PerRobot:
-    """Return an upper bound of the number of stations along each tail: on the plain helix and the arm to it."""
-    wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
-    return batch.form.starts * station_count(wire_length, 0.5 * batch.wire_diameter)
-
-
 def robot_solution(batch: RobotBatch, index: int = 0) -> UnitTwistSolution:
     """Tractions on robot number `index` for all unit twists, at phase 0."""
     return _solved(RobotGeometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
@@ -72,15 +66,6 @@ def _slimness(batch: RobotBatch) -> list[Limit]:
         ("coupling.length less clearance", np.where(coupled, solid, np.inf), _SLIMMEST * batch.coupling_diameter),
     )
     return [Limit.of(name, value, "at least", bound, "mm", why, "solid-too-slim") for name, value, bound in rows]
-
-
-def _apart(batch: RobotBatch, limits: list[Limit]) -> Limit:
-    """Require that no part of the wire touches another, for robots that satisfy the other limits."""
-    nearest = np.full(batch.size, np.inf)
-    for index in within(batch, limits):
-        nearest[index] = _closest(RobotGeometry.of(batch, index))
-    why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
-    return Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch")
 
 
 @lru_cache(maxsize=4096)
@@ -159,6 +144,7 @@ class Slender(SwimmerModel):
         coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
         behind = batch.coupling_length if batch.shape != "none" else np.full(1, np.inf)
+        wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
         limits = [
             Limit.of(
                 "coupling.length",
@@ -198,7 +184,7 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "stations along the tail (tail.wire_diameter)",
-                stations_of(batch),
+                batch.form.starts * station_count(wire_length, 0.5 * batch.wire_diameter),
                 "at most",
                 float(MOST_STATIONS[resolution.wire]),
                 "1",
@@ -207,7 +193,14 @@ class Slender(SwimmerModel):
             ),
             *_slimness(batch),
         ]
-        return [*limits, _apart(batch, limits)]
+        nearest = np.full(batch.size, np.inf)
+        for index in within(batch, limits):
+            nearest[index] = _closest(RobotGeometry.of(batch, index))
+        why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
+        return [
+            *limits,
+            Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch"),
+        ]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""

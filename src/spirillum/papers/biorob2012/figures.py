@@ -153,14 +153,6 @@ def frenet_frames(robot: Robot, xi: Samples) -> FrenetFrames:
     return FrenetFrames(position, tangent, normal, np.asarray(np.cross(tangent, normal)))
 
 
-def _basis() -> tuple[Samples, Samples, Samples]:
-    """Unit vectors to the right, upwards and away in the picture."""
-    away = _SIGHT / np.linalg.norm(_SIGHT)
-    right = np.cross(away, np.array([0.0, 0.0, 1.0]))
-    right = right / np.linalg.norm(right)
-    return right, np.asarray(np.cross(right, away)), away
-
-
 def frenet_figure(robot: Robot) -> Figure:
     """Parallel projection of the wire at phase 0 in units of its amplitude, with t, n, b and the lab's directions."""
     tail = robot.tail
@@ -171,7 +163,10 @@ def frenet_figure(robot: Robot) -> Figure:
     marked = frenet_frames(robot, np.array(_MARKED) * tail.length)
     reach = 0.085 * tail.length / unit
     start = wire[0] + np.array([1.6 * reach, 0.0, 0.0]) - wire[0] * np.array([0.0, 1.0, 1.0])
-    right, up, away = _basis()
+    away = _SIGHT / np.linalg.norm(_SIGHT)
+    right = np.cross(away, np.array([0.0, 0.0, 1.0]))
+    right = right / np.linalg.norm(right)
+    up = np.asarray(np.cross(right, away))
 
     def seen(points: Samples) -> Samples:
         return np.stack([(points - middle) @ right, (points - middle) @ up], axis=-1)

@@ -77,9 +77,10 @@ def _drops(robot: Robot) -> list[float]:
 
 
 def _entry(published: float, found: Prediction, beside: Prediction, sign: float) -> dict[str, Any]:
+    speeds = [None if one.trial is None else one.trial.values.get("forward_velocity") for one in (found, beside)]
     ours = {
         "held": sign * (found.forward_velocity - beside.forward_velocity),
-        "trial": _difference(found, beside, sign),
+        "trial": (None if speeds[0] is None or speeds[1] is None else sign * (speeds[0] - speeds[1])),
     }
     return {
         "quantity": "forward_velocity",
@@ -89,12 +90,6 @@ def _entry(published: float, found: Prediction, beside: Prediction, sign: float)
         "source": _SOURCE,
         "remark": _REMARK,
     }
-
-
-def _difference(found: Prediction, beside: Prediction, sign: float) -> float | None:
-    """Difference of the trials' speeds, m/s; None where one has none."""
-    speeds = [None if one.trial is None else one.trial.values.get("forward_velocity") for one in (found, beside)]
-    return None if speeds[0] is None or speeds[1] is None else sign * (speeds[0] - speeds[1])
 
 
 def paper_study() -> dict[str, Any]:

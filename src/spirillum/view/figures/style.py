@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 
 from spirillum.arrays import Values
-from spirillum.files import MARK, atomic_write
+from spirillum.files import MARK, atomic_write, written_by_us
 from spirillum.units import for_people, shown_in
 
 COLOURS = {
@@ -177,21 +177,28 @@ def _spelled(formula: str) -> str:
     return re.sub(r"[{}]", "", formula)
 
 
-def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
-    """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all; return both paths."""
+def save(figure: Figure, path_without_suffix: Path, *, vector: bool = False) -> list[Path]:
+    """Write a PNG (200 dpi) and, if requested, an SVG (text as paths, no date), each whole or not at all.
+
+    Returns:
+        The paths. An SVG of an earlier figure beside a PNG of this one is removed.
+    """
     folder, name = path_without_suffix.parent, path_without_suffix.name
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     engine, dpi = figure.get_layout_engine(), figure.dpi
     if engine is not None and not isinstance(engine, PlaceHolderLayoutEngine):
         figure.dpi = DPI
         with styled():
-            engine.execute(figure)  # once: else it takes a drawing of its own before each of the two
+            engine.execute(figure)  # once: else it takes a drawing of its own before each file
         figure.dpi = dpi
         figure.set_layout_engine("none")
     save_as(figure, png)
-    save_as(figure, svg)
+    if vector:
+        save_as(figure, svg)
+    elif svg.is_file() and written_by_us(svg):
+        svg.unlink()
     figure.set_layout_engine(engine)
-    return png, svg
+    return [png, svg] if vector else [png]
 
 
 def save_as(figure: Figure, path: Path) -> None:

@@ -168,9 +168,7 @@ def _around(dataset: xr.Dataset) -> str:
     if abs(around) < _ONE_WAY * swing:
         return f"goes {swing:.2g}° around the tube, to and fro"
     turned = float(dataset["body_angle"][-1] - dataset["body_angle"][0]) if "body_angle" in dataset else 0.0
-    sense = (
-        "" if turned == 0 else " with its body's rotation" if turned * around > 0 else " against its body's rotation"
-    )
+    sense = f" {'with' if turned * around > 0 else 'against'} its body's rotation" if turned else ""
     return f"goes {abs(around):.2g}° around the tube{sense}"
 
 
@@ -182,11 +180,8 @@ def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
         found.insert(0, f"mean velocity {show(mean, unit)} with the drive on")
     found += [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
     if in_tube:
-        found += [
-            f"{words} {plain(str(attrs[name]), 40)}"
-            for name, words in (("ends", "ends"), ("friction_coefficient", "dry friction"))
-            if name in attrs
-        ]
+        named = {"ends": "ends", "friction_coefficient": "dry friction"}
+        found += [f"{words} {plain(str(attrs[name]), 40)}" for name, words in named.items() if name in attrs]
         found += [f"roughness {show_height(float(attrs['roughness']))}"] if "roughness" in attrs else []
         found += [f"waited {attrs['wait']:g} s"] if attrs.get("wait") else []
     if "draws" in attrs:

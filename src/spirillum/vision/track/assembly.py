@@ -1,9 +1,4 @@
-"""From a video to a track: following the robot, then lengths, continuous angles, true times, and all flags.
-
-Frames on which something else than the robot was followed: its marks are not there, and its place jumps.
-Where a still picture hides a slow robot, or clutter looks like a body, the outline may lie beside the robot for a
-while and then find it. Neither stripes nor tail can be read meanwhile, as they are looked for where they are not.
-"""
+"""From a video to a track: following the robot, then lengths, continuous angles, true times, and all flags."""
 
 from __future__ import annotations
 
@@ -18,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
-from spirillum.robust import least_squares_line, repeated_median_line, stretches_of
+from spirillum.robust import least_squares_line
 from spirillum.vision.camera.anchor import Steadied, steadied, sways
 from spirillum.vision.camera.camera import opened, samples_of, scale_of
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
@@ -29,6 +24,7 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
 from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
+from spirillum.vision.track.false_detection import something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection, learnt_from
 from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
@@ -59,19 +55,6 @@ class SwayConstants:
 
 
 SWAY = SwayConstants()
-
-
-@dataclass(frozen=True)
-class FalseDetectionConstants:
-    """Frames on which something else than the robot was followed."""
-
-    fewest: int = 12  #: Fewest frames on which stripes or tail are read.
-    shortest: int = 3  #: Fewest frames in a row without them.
-    beside: int = 5  #: Frames to both sides of a jump whose medians are compared.
-    jump: float = 0.15  #: Jump of the place over the body's length.
-
-
-FALSE_DETECTION = FalseDetectionConstants()
 
 
 class Swayed(NamedTuple):
@@ -120,41 +103,6 @@ def _largest_jump(time: Samples, x: Samples) -> float:
     return float(np.abs(middle[wide:] - middle[:-wide]).max())
 
 
-def something_else(time: Samples, place: Samples, marked: np.ndarray, length: float) -> np.ndarray:
-    """Frames of stretches without marks from which the position jumps to frames with marks, a mask, (n,)."""
-    found = np.zeros(time.size, dtype=bool)
-    known = np.isfinite(place).all(axis=1)
-    sure = np.flatnonzero(marked & known)
-    if sure.size < FALSE_DETECTION.fewest:
-        return found
-    speed = np.array([repeated_median_line(time[sure], place[sure, axis]).slope for axis in (0, 1)])
-    along = place - speed * (time - time[0])[:, None]  # what does not move as the robot does jumps
-    for stretch in stretches_of(~marked & known):
-        beside = sure[(sure > stretch[-1]) | (sure < stretch[0])]
-        after, before = beside[beside > stretch[-1]], beside[beside < stretch[0]]
-        few = FALSE_DETECTION.beside
-        sides = [(stretch[-few:], after[:few]), (stretch[:few], before[-few:])]
-        jumps = [np.median(along[own], axis=0) - np.median(along[other], axis=0) for own, other in sides if other.size]
-        if stretch.size >= FALSE_DETECTION.shortest and all(
-            np.hypot(*jump) > FALSE_DETECTION.jump * length for jump in jumps
-        ):
-            found[stretch] = True
-    return found
-
-
-def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
-    """Note on such frames."""
-    count = int(found.sum())
-    if not count:
-        return ()
-    sentence = (
-        f"on {count} frames ({100.0 * count / found.size:.3g} %) something else than the robot was followed: neither "
-        "stripes nor tail are there, and the place jumps to where they are; these frames are left out (a [region] of "
-        "the setup around the robot's way leaves out what looks like it)"
-    )
-    return (Flag("something-else-followed", sentence),)
-
-
 _DOUBTFUL_STRIPES = Flag(
     "stripes-do-not-fit",
     "the stripes seem uneven on a body that is not as large as it should be, which may be the reason; the body's "
@@ -200,7 +148,7 @@ def track_of(
     told = seen & ~cut & (body.seal is None)  # a nose of glass shows what lies under it; against the seal, cues decide
     elongation = np.where(told, [one.elongation for one in record.placed], np.nan)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
-    other = something_else(time, pose[:, :2], np.isfinite(roll[:, 0]) | np.isfinite(tail[:, 0]), body.robot.body.length)
+    other = something_else(time, pose, (roll, tail), body.robot.body.length, optics.length_per_pixel)
     pose[other] = errors[other] = elongation[other] = np.nan
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     along = AlignedTrack(position, pose[:, 2], ())
