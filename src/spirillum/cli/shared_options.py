@@ -64,6 +64,8 @@ def complete_resistance_models(incomplete: str) -> list[str]:
 
 
 complete_parts = choices("body", "both", "coupling", "robot", "rotor", "tail")
+COMPLETERS = {"ROBOTS": complete_robots, "PRESETS": complete_presets, "MODELS": complete_auto_models}
+"""Completions that own options name in their table; others list their words."""
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "answer": choices("held", "trial"),
     "accuracy": choices("high", "standard"),
