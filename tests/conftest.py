@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -123,6 +124,13 @@ def flat_pictures() -> ModuleType:
 def learning_shared() -> Iterator[None]:
     """The tracker learns from the same frames once for all tests of a file."""
     with learnt_once():
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _without_progress() -> Iterator[None]:
+    """A slow machine prints no lines of progress, for tests compare what a command prints."""
+    with mock.patch("spirillum.cli.progress.FIRST", 600.0):
         yield
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.calibration.experiment import read_experiment
-from spirillum.calibration.forward import Forward
+from spirillum.calibration.forward_models import Forward
 from spirillum.calibration.problem import posed
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch

@@ -27,12 +27,24 @@ LONG = {
 }
 
 
+SAYS_WHEN = """
+import sys
+from spirillum.dynamics import integration
+run = integration._stretch
+def said(*of, **how):
+    integration._stretch = run
+    print("it is at work", file=sys.stderr, flush=True)
+    return run(*of, **how)
+integration._stretch = said
+"""
+
+
 def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tuple[int, str]:
     """Exit code and standard error of a command that gets a signal while it is at work."""
     environment = os.environ | {"SPIRILLUM_CACHE": str(folder / "cache"), "COLUMNS": "400"}
     script = (
         "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # background jobs ignore it
-        "from spirillum.cli import main\nmain()"
+        f"{SAYS_WHEN if command[0] == 'simulate' else ''}from spirillum.cli import main\nmain()"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", script, *command],
@@ -44,12 +56,8 @@ def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tup
         start_new_session=True,
     )
     assert process.stderr is not None
-    if command[0] == "prepare":
-        said = process.stderr.readline()  # it is at work
-        time.sleep(0.5)
-    else:
-        said = ""
-        time.sleep(4.0)
+    said = process.stderr.readline()  # it is at work
+    time.sleep(0.5)
     (os.killpg if group else os.kill)(process.pid, number)
     _, rest = process.communicate(timeout=60)
     end = time.monotonic() + 20.0
@@ -65,11 +73,11 @@ def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tup
 @pytest.mark.parametrize(("name", "group"), [("a run", False), ("a table by two processes", True)])
 def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: bool, number: int, code: int) -> None:
     ended, said = _ended(LONG[name], tmp_path, number, group=group)
-    *before, last = said.splitlines()
+    *before, last = [line for line in said.splitlines() if not line.startswith("at work, ")]
     assert ended == code
     assert last.startswith("spirillum: interrupted; ")
     if name == "a run":
-        assert not before
+        assert before == ["it is at work"]
     else:
         assert [
             line for line in before if not line.startswith(("no table of this tube yet", "poses of the table: "))
@@ -116,7 +124,8 @@ def test_lines_come_at_a_rate_that_can_be_read() -> None:
     assert clock.now == 1200.0
 
 
-def test_piped_work_is_named_after_some_seconds() -> None:
+def test_piped_work_is_named_after_some_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spirillum.cli.progress.FIRST", 5.0)
     clock, lines = _Clock(), list[str]()
     progress = ProgressLines(lines.append, ("no table",), clock)
     for _ in range(25):

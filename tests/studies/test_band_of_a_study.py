@@ -8,7 +8,7 @@ import pytest
 from matplotlib.legend import Legend
 
 import spirillum as sp
-from spirillum.papers.biorob2012.claims import claims_of_study
+from spirillum.papers.biorob2012.claims_predicted import claims_of_study
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.registry import figures_of
 from spirillum.studies.columns import AT_POSES, BandTask

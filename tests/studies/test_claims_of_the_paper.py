@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.claims import claims_of_study
+from spirillum.papers.biorob2012.claims_predicted import claims_of_study
 from spirillum.papers.claim import Claim
 from spirillum.papers.registry import claims_of
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
-from spirillum.calibration.forward import Forward, kinematics
 from spirillum.calibration.forward_models import (
+    Forward,
     Ranges,
     TrialSurfaces,
     check_free,
+    kinematics,
     place_ranges,
     trial_surfaces,
     tube_forward,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Event, Lock, Thread
+from threading import Event, Lock, Thread, Timer
 from time import monotonic
 
 _PERIOD = 15.0  # least time between two lines, s
@@ -32,6 +32,18 @@ def progress_lines(write: Callable[[str], object], announcements: tuple[str, ...
     finally:
         ended.set()
         thread.join()
+
+
+@contextmanager
+def line_after(write: Callable[[str], object], what: str) -> Iterator[None]:
+    """Print a line once where the block takes long."""
+    timer = Timer(FIRST, write, (f"{what}, {FIRST:.0f} s elapsed",))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 class StagePace:

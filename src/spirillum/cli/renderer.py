@@ -16,7 +16,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from spirillum.cli.progress import FIRST, StagePace, duration, progress_lines
+from spirillum.cli.progress import StagePace, duration, line_after, progress_lines
 from spirillum.cli.shared_options import every_note
 from spirillum.cli.tables import blocks_of
 from spirillum.cli.tables.parts import Answer, Block, Detail
@@ -161,19 +161,7 @@ def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
     console = Console(stderr=True)
     if quiet:
         return nullcontext()
-    return console.status(what) if console.is_terminal else _line_after(FIRST, what)
-
-
-@contextmanager
-def _line_after(seconds: float, line: str) -> Iterator[None]:
-    """Print a line where the block takes longer."""
-    timer = Timer(seconds, _print_line, (f"{line}, {seconds:.0f} s elapsed",))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
+    return console.status(what) if console.is_terminal else line_after(_print_line, what)
 
 
 def _print_line(line: str) -> None:

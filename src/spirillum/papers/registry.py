@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from spirillum.papers.biorob2012.claims import claims_of_study, predictions_of_study
+from spirillum.papers.biorob2012.claims_predicted import claims_of_study, predictions_of_study
 from spirillum.papers.biorob2012.figures import PAPER_FIGURES, more_figures
 from spirillum.papers.claim import Claim
 from spirillum.view.figures.sheet import Picture

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Values
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
+from spirillum.papers.biorob2012 import claims_swimming
 from spirillum.papers.biorob2012.evidence import (
     BODY_DRAG_FACTORS,
     BODY_ROTATION_ERROR,
@@ -28,6 +29,9 @@ from spirillum.robot.load import load
 from spirillum.studies.released_robots import INFERRED_BY
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def calibration_factors(evidence: Evidence) -> Iterator[Claim]:
@@ -345,3 +349,36 @@ def _contact(readings: FrictionModelRuns) -> Iterator[Claim]:
         f"asperities touch for {_range(share, ' %', 100.0)} of the time",
         readings.verdict_on(readings.holds(np.minimum(share, 1.0 - share))),
     )
+
+
+def claims_of_study(dataset: xr.Dataset) -> list[Claim]:
+    """Compare a study that names this paper with its statements; empty for one of other channels."""
+    if not _of_this_paper(dataset):
+        return []
+    evidence = Evidence(dataset)
+    sources: tuple[Callable[[Evidence], Iterator[Claim]], ...] = (
+        claims_swimming.reynolds_numbers,
+        claims_swimming.velocity_drops,
+        claims_swimming.global_drop,
+        claims_swimming.trends,
+        claims_swimming.body_rotation,
+        claims_swimming.motor_rates,
+        claims_swimming.effective_friction,
+        claims_swimming.model_comparison,
+        calibration_factors,
+        robot_and_channel,
+        method,
+    )
+    return [claim for source in sources for claim in source(evidence)]
+
+
+def predictions_of_study(dataset: xr.Dataset) -> list[Claim]:
+    """Evaluate the statements for released robots, verdicts of a third kind; empty without such robots."""
+    return predicted(Evidence(dataset)) if _of_this_paper(dataset) else []
+
+
+def _of_this_paper(dataset: xr.Dataset) -> bool:
+    """Whether a study has the paper's channels."""
+    if "channel" not in dataset.dims:
+        return False
+    return {"wide", "narrow"} <= {str(name) for name in dataset["channel"].values}
