@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
-from pathlib import Path
 
+from spirillum.data_tables import rows_of
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_model
 from spirillum.version import own_version
 
-_TABLE = Path(__file__).with_name("references.csv").read_text(encoding="utf-8")
-REFERENCES: dict[str, str] = dict(csv.reader(_TABLE.splitlines()[1:]))  #: Key to full reference.
+REFERENCES = {row["key"]: row["reference"] for row in rows_of("references.csv")}  #: Key to full reference.
 
 _SOFTWARE = "The Spirillum developers. spirillum, version {version}."
 

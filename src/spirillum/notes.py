@@ -6,17 +6,17 @@ programs. The code's longer explanation is in `notes.csv` and, written from ther
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any, Literal, NamedTuple
+
+from spirillum.data_tables import rows_of
 
 
 def _explanations() -> dict[str, dict[str, str]]:
     """Explanations of `notes.csv` by code, in the order of the file, for each kind of note."""
     found: dict[str, dict[str, str]] = {}
-    for row in csv.DictReader(Path(__file__).with_name("notes.csv").read_text(encoding="utf-8").splitlines()):
+    for row in rows_of("notes.csv"):
         found.setdefault(row["kind"], {}).update(dict.fromkeys(row["codes"].split(), row["explanation"]))
     return found
 

@@ -6,10 +6,9 @@ of figures and the documentation read it from here.
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
 from typing import Any, NamedTuple
 
+from spirillum.data_tables import rows_of
 from spirillum.units import for_people
 
 
@@ -28,8 +27,7 @@ class Quantity(NamedTuple):
         return for_people(self.unit)
 
 
-_TABLE = Path(__file__).with_name("quantities.csv").read_text(encoding="utf-8")
-QUANTITIES: dict[str, Quantity] = {row[0]: Quantity(*row) for row in csv.reader(_TABLE.splitlines()[1:])}
+QUANTITIES = {row["name"]: Quantity(**row) for row in rows_of("quantities.csv")}
 """Every quantity by its name."""
 
 

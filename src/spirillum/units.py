@@ -6,16 +6,15 @@ own (`units.txt`) where angle is a dimension, because 1 Hz of a rotating part is
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from spirillum.data_tables import rows_of
 from spirillum.errors import InputError
 from spirillum.scalars import is_number, plain_minus
 from spirillum.unit_spelling import other_spellings, plain_unit, spelled_names
@@ -58,7 +57,7 @@ _SI: dict[str, float] = {
 """SI values of the units that are shown, and of those that files mostly state."""
 
 
-_UNITS = list(csv.DictReader(Path(__file__).with_name("shown_units.csv").read_text(encoding="utf-8").splitlines()))
+_UNITS = rows_of("shown_units.csv")
 USUAL = {row["unit"]: tuple(row["read"].split("; ")) for row in _UNITS if row["read"]}
 """Units of a kind's own unit that files mostly state: they are read without pint, which takes a while to load."""
 
@@ -84,8 +83,10 @@ class Kind:
         return f"{self.low} to {self.high}"
 
 
-_ROWS = csv.reader(Path(__file__).with_name("kinds.csv").read_text(encoding="utf-8").splitlines()[1:])
-KINDS: dict[str, Kind] = {row[0]: Kind(row[1], row[2], row[3], row[4], row[5], row[6] or None) for row in _ROWS}
+KINDS = {
+    row["kind"]: Kind(row["name"], row["unit"], row["example"], row["low"], row["high"], row["also"] or None)
+    for row in rows_of("kinds.csv")
+}
 
 
 @lru_cache(maxsize=1)

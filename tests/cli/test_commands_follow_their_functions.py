@@ -81,6 +81,20 @@ def test_the_tables_of_names_hold_nothing_unused() -> None:
     assert not set(COMPLETIONS) - {path.rpartition(".")[2] for path in paths}
 
 
+def test_every_row_of_the_own_options_is_a_parameter_of_its_command() -> None:
+    from spirillum.cli.measurement_commands import observations_app
+    from spirillum.cli.robot_commands import robot_app
+    from spirillum.cli.shared_options import OWN
+
+    bodies = [
+        info.callback.source.body if hasattr(info.callback, "source") else info.callback
+        for part in (app, robot_app, setup_app, observations_app)
+        for info in part.registered_commands
+    ]
+    known = {(body.__name__, name) for body in bodies for name in inspect.signature(body).parameters}
+    assert not set(OWN) - known
+
+
 def pages(command: object, words: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
     """Words of every command."""
     found = [words]

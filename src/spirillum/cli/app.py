@@ -24,7 +24,6 @@ from spirillum.cli.shared_options import (
     Json,
     NotedCommand,
     Settings,
-    choices,
     complete_auto_models,
     complete_resistance_models,
 )
@@ -166,10 +165,10 @@ def study(
     context: typer.Context,
     source: Path | None = None,
     output: Path | None = None,
-    workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
+    workers: int = 2,
     cluster: str | None = None,
     store: Path | None = None,
-    rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = _ROWS,
+    rows: int = _ROWS,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -204,14 +203,7 @@ def study(
         raise typer.Exit(2)
 
 
-def schema(
-    name: Annotated[
-        str,
-        typer.Argument(
-            autocompletion=choices("calibration", "robot", "setup", "study"), help="robot, study, calibration or setup."
-        ),
-    ],
-) -> None:
+def schema(name: str) -> None:
     """Print the JSON schema of a file: robot, study, calibration or setup.
 
     Example: `spirillum schema robot`

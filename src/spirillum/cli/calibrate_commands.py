@@ -118,10 +118,7 @@ def rank_models(
     request: Request,
     *,
     observations: Path,
-    robot: Annotated[
-        list[str] | None,
-        typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
-    ] = None,
+    robot: list[str] | None = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -154,10 +151,7 @@ def suggest(
     request: Request,
     *,
     posterior: Path,
-    robot: Annotated[
-        list[str] | None,
-        typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
-    ] = None,
+    robot: list[str] | None = None,
     rows: int = 10,
     settings: Settings = None,
     json: Json = False,

@@ -12,14 +12,13 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, Json, choices, starting
+from spirillum.cli.shared_options import PANELS, Json, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
     from spirillum.controllers.sensors import Senses
 
 
-_LAB = PANELS["lab"]
 _EYES = ("model", "tracker")
 
 
@@ -74,14 +73,7 @@ def control(
     ] = "stop-at",
     output: Path | None = None,
     with_: list[str] | None = None,
-    seen_by: Annotated[
-        str,
-        typer.Option(
-            autocompletion=choices(*_EYES),
-            help="model (the camera of the lab) or tracker (rendered frames, tracked).",
-            rich_help_panel=_LAB,
-        ),
-    ] = "model",
+    seen_by: str = "model",
     remote: str | None = None,
     model: str = "auto",
     roughness: str | None = None,

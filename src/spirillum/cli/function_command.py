@@ -22,6 +22,7 @@ import typer
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.interrupts import InterruptibleCommand
 from spirillum.cli.shared_options import (
+    COMPLETERS,
     COMPLETIONS,
     EXAMPLES,
     LISTED,
@@ -33,6 +34,7 @@ from spirillum.cli.shared_options import (
     NotedCommand,
     RobotArgument,
     Settings,
+    choices,
 )
 from spirillum.errors import InputError
 
@@ -257,6 +259,9 @@ def _own(command: str, name: str, kind: Any) -> Any:
     if row is None:
         return kind
     about: Any = {"metavar": row["placeholder"] or None, "help": row["help"], "rich_help_panel": row["panel"] or None}
+    about |= {end: int(row[name]) for end, name in (("min", "least"), ("max", "most")) if row[name]}
+    if words := row["completion"].split():
+        about["autocompletion"] = COMPLETERS[words[0]] if words[0] in COMPLETERS else choices(*words)
     argument = row["option"] == "argument"
     return Annotated[kind, typer.Argument(**about) if argument else typer.Option(*row["option"].split(), **about)]
 

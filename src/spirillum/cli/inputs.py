@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+from spirillum.data_tables import rows_of
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
@@ -29,7 +29,7 @@ class Rule(NamedTuple):
 def _rules() -> dict[str, list[Rule]]:
     """The rows of `rules.csv`."""
     found: dict[str, list[Rule]] = {}
-    for row in csv.DictReader(Path(__file__).with_name("rules.csv").read_text(encoding="utf-8").splitlines()):
+    for row in rows_of("cli/rules.csv"):
         rule = Rule(row["state"], tuple(row["options"].split()), row["conflict"])
         found.setdefault(row["command"], []).append(rule)
     return found

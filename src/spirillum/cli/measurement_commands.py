@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
-    DISTURBANCES_PANEL,
     Json,
     NotedCommand,
     Settings,
@@ -152,17 +151,6 @@ def _size(word: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-_Preset = Annotated[
-    str,
-    typer.Option(
-        "--preset",
-        autocompletion=choices("clean", "degraded"),
-        help="clean, or degraded: all disturbances but bubbles and hand.",
-        rich_help_panel=DISTURBANCES_PANEL,
-    ),
-]
-
-
 @from_function(
     "spirillum.virtual.trial:render",
     without={"path": "-o FILE", "setup": "it is written beside the video", "troubles.": "--trouble, by name"},
@@ -172,7 +160,7 @@ def render(
     request: Request,
     *,
     output: Path,
-    preset: _Preset = "clean",
+    preset: str = "clean",
     trouble: list[str] | None = None,
     json: Json = False,
 ) -> None:
@@ -203,7 +191,7 @@ def virtual_experiment(
     *,
     study: Path | None = None,
     output: Path = Path("spirillum-virtual-experiment"),
-    preset: _Preset = "clean",
+    preset: str = "clean",
     json: Json = False,
 ) -> None:
     """Film five trials of each robot of a study with that camera, with their truth: synthetic. A rerun resumes.

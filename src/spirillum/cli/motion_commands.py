@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import time_window
@@ -15,23 +13,12 @@ from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
     Json,
-    complete_auto_models,
     complete_models,
 )
 from spirillum.notes import note_attributes, notes_in
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-_FullModel = Annotated[
-    str,
-    typer.Option(
-        autocompletion=complete_auto_models,
-        help="Hydrodynamic model: rft, slender, tube, held also sbt; or auto: that of the posterior or calibration, "
-        "else tube in a channel and slender without.",
-    ),
-]
 
 
 @from_function(
@@ -50,7 +37,7 @@ def simulate(
     request: Request,
     *,
     output: Path | None = None,
-    model: _FullModel = "auto",
+    model: str = "auto",
     on: list[str] | None = None,
     flow: str | None = None,
     plot: Path | None = None,

@@ -15,7 +15,6 @@ from spirillum.cli.shared_options import (
     RobotArgument,
     Settings,
     choices,
-    complete_presets,
     complete_robots,
     starting,
 )
@@ -26,14 +25,7 @@ robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot f
 
 @robot_app.command("new", cls=NotedCommand)
 @own_options
-def robot_new(
-    path: Path,
-    *,
-    preset: Annotated[
-        str, typer.Option("--from", autocompletion=complete_presets, help="Preset or validation robot to start from.")
-    ] = "biorob2012-wide",
-    force: bool = False,
-) -> None:
+def robot_new(path: Path, *, preset: str = "biorob2012-wide", force: bool = False) -> None:
     """Write a robot file to edit, with every field of a preset.
 
     Example: `spirillum robot new my-robot.toml --from biorob2012-wide`
@@ -78,15 +70,12 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
 
 
 def prepare(
-    robots: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[ROBOT]...", autocompletion=complete_robots, help="Presets' names or TOML files."),
-    ] = None,
+    robots: list[str] | None = None,
     study: str | None = None,
     stage: str | None = None,
     *,
     fine: bool = False,
-    workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
+    workers: int = 2,
     settings: Settings = None,
     json: Json = False,
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from copy import copy
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from spirillum.cli.interrupts import InterruptibleCommand
+from spirillum.data_tables import rows_of
 
 MODEL_PANEL = "Model"  #: Panel of the help: which model answers, with which friction and calibration, how finely.
 PLACE_PANEL = "Pose in the channel (model tube)"  #: Panel of the help: pose of the robot in its channel.
@@ -64,6 +64,8 @@ def complete_resistance_models(incomplete: str) -> list[str]:
 
 
 complete_parts = choices("body", "both", "coupling", "robot", "rotor", "tail")
+COMPLETERS = {"ROBOTS": complete_robots, "PRESETS": complete_presets, "MODELS": complete_auto_models}
+"""Completions that own options name in their table; others list their words."""
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "answer": choices("held", "trial"),
     "accuracy": choices("high", "standard"),
@@ -79,11 +81,7 @@ COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
 """Completions of the shell, by argument or field of a table."""
 
 
-def _rows(table: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(Path(__file__).with_name(table).read_text(encoding="utf-8").splitlines()))
-
-
-_ROWS = _rows("options.csv")
+_ROWS = rows_of("cli/options.csv")
 
 
 def _column(name: str) -> dict[str, str]:
@@ -95,7 +93,7 @@ NAMES = _column("option")  #: Options that are not named after the argument or f
 METAVARS = _column("placeholder")  #: Placeholder of a value in the help, where its kind does not give one.
 EXAMPLES = _column("example")  #: Of quantities, by kind or argument.
 TEXTS = _column("help")  #: Helps of arguments that docstrings explain elsewhere.
-OWN = {(row["command"], row["parameter"]): row for row in _rows("own_options.csv")}
+OWN = {(row["command"], row["parameter"]): row for row in rows_of("cli/own_options.csv")}
 """Options and arguments that a command has beside those of its function."""
 PANELS = {
     **dict.fromkeys(("model", "friction", "calibrated", "calibration", "posterior", "posterior_for"), MODEL_PANEL),

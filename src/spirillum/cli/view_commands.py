@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -35,9 +35,6 @@ def page(request: Request) -> None:
 _VIEWS = choices("front", "perspective", "rear", "side", "top")
 
 
-_View = Annotated[str, typer.Option(autocompletion=_VIEWS, help="perspective, or to scale: side, top, front, rear.")]
-
-
 @from_function("spirillum.view.scene3d.show:show", without={"path": "-o FILE"}, complete={"view": _VIEWS})
 def show(request: Request, *, output: Path | None = None, window: bool = False, json: Json = False) -> None:
     """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
@@ -55,17 +52,11 @@ def show(request: Request, *, output: Path | None = None, window: bool = False, 
 def film(
     run: Path,
     output: Path,
-    view: _View = "perspective",
+    view: str = "perspective",
     size: str = "1280x720",
     fps: int = 30,
     speed: float | None = None,
-    camera: Annotated[
-        str,
-        typer.Option(
-            autocompletion=choices("auto", "fixed", "follow"),
-            help="fixed, follow, or auto (follow a robot that swims far).",
-        ),
-    ] = "auto",
+    camera: str = "auto",
     json: Json = False,
 ) -> None:
     """Film a run of `simulate` in three dimensions, to show to people. Needs the extra `3d`.
@@ -107,9 +98,7 @@ def flow(
     context: typer.Context,
     output: Path | None = None,
     volume: Path | None = None,
-    plane: Annotated[
-        str, typer.Option(autocompletion=choices("xy", "xz", "yz"), help="xz (side), xy (from above) or yz (across).")
-    ] = "xz",
+    plane: str = "xz",
     offset: str = "0mm",
     extent: str | None = None,
     resolution: int = 240,

@@ -7,15 +7,14 @@ changes on the way is taken for a part of the speed. Other causes are edges that
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.measurement.rates import Rate, rate_of
 from spirillum.measurement.statistics import NORMAL
 from spirillum.robot.robot import Robot
@@ -84,8 +83,7 @@ _MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
 _FEWEST_FRAMES = 4  # fewest measured frames of a video that give a rate
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
-_TABLE = Path(__file__).with_name("implied_flags.csv").read_text(encoding="utf-8")
-_IMPLIED = {flag: {*implied.split()} for flag, implied in csv.reader(_TABLE.splitlines()[1:])}
+_IMPLIED = {row["flag"]: {*row["implied"].split()} for row in rows_of("measurement/implied_flags.csv")}
 """Flags that are redundant beside another one that withholds a number, by its name; it withholds what they do."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}

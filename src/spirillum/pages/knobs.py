@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
+from spirillum.data_tables import rows_of
 from spirillum.errors import InputError, check_choice, clipped
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -79,7 +78,7 @@ class Knob:
 
 def _knobs() -> Iterator[Knob]:
     """The rows of `knobs.csv`; a choice has no range."""
-    for row in csv.DictReader(Path(__file__).with_name("knobs.csv").read_text(encoding="utf-8").splitlines()):
+    for row in rows_of("pages/knobs.csv"):
         words: Any = {name: row[name] for name in ("field", "label", "group", "unit", "note", "unset", "needs")}
         ends: Any = {end: float(row[end]) for end in ("low", "high") if row[end]}
         yield Knob(**words, **ends, choices=tuple(row["choices"].split()), logarithmic=row["logarithmic"] != "")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import base64
-import csv
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.links import outlines_of
 from spirillum.robot.mesh import COLOURS, RobotMesh, robot_mesh
@@ -86,7 +85,7 @@ def _linear(colour: Samples) -> Samples:
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
 
 
-_ROWS = list(csv.DictReader(Path(__file__).with_name("quantities.csv").read_text(encoding="utf-8").splitlines()))
+_ROWS = rows_of("pages/quantities.csv")
 
 
 def _names(column: str) -> tuple[str, ...]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
+from spirillum.data_tables import rows_of
 from spirillum.errors import InputError, clipped
 
 _LONGEST = 200  # characters of a field
@@ -31,7 +30,7 @@ class Entry:
 
 def _entries() -> Iterator[Entry]:
     """The rows of `setup_form.csv`."""
-    for row in csv.DictReader(Path(__file__).with_name("setup_form.csv").read_text(encoding="utf-8").splitlines()):
+    for row in rows_of("pages/setup_form.csv"):
         words: Any = {name: row[name] for name in ("field", "label", "group", "example", "note")}
         yield Entry(
             **words, choices=tuple(row["choices"].split()), number=row["number"] != "", uncertain=row["uncertain"] != ""

@@ -6,9 +6,7 @@ contact; any other its path from the side and from above, current, powers and en
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.dynamics.run_file import check_increasing, robot_of
 from spirillum.errors import InputError, check_choice
 from spirillum.quantities import unit_of
@@ -56,7 +55,7 @@ class _Panel:
 def _panels(run: str) -> list[_Panel]:
     """The rows of `run_panels.csv` for a run: any, or one in a tube."""
     found = []
-    for row in csv.DictReader(Path(__file__).with_name("run_panels.csv").read_text(encoding="utf-8").splitlines()):
+    for row in rows_of("view/figures/run_panels.csv"):
         lines = [line.partition(" ") for line in row["lines"].split("; ")]
         if row["run"] == run:
             kinds = dict.fromkeys(row["kinds"].split(), True)
