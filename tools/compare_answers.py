@@ -122,5 +122,7 @@ def compare(before: Path, after: Path) -> int:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["record"]:
         record(Path(sys.argv[2]).resolve(), sys.argv[3:])
-    else:
+    elif sys.argv[1:2] == ["compare"]:
         sys.exit(compare(Path(sys.argv[2]), Path(sys.argv[3])))
+    else:
+        sys.stdout.write(str(__doc__))

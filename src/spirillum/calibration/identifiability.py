@@ -150,7 +150,7 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     return Note("not-identifiable", words, labels)
 
 
-def _listed(items: list[str]) -> str:
+def _listed(items: Sequence[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
@@ -253,8 +253,8 @@ def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivi
     known = problem.assumed
     stated = [f"{field} ({100 * known[name]:g} %)" for field, name in ASSUMABLE.items() if name in known]
     exact = [field for field, name in ASSUMABLE.items() if name not in known]
-    said = [f"hold the stated uncertainty of {_joined(stated)}"] if stated else []
-    said += [f"take {_joined(exact)} as exact"] if exact else []
+    said = [f"hold the stated uncertainty of {_listed(stated)}"] if stated else []
+    said += [f"take {_listed(exact)} as exact"] if exact else []
     subject, verbs, advice = "intervals of B_eff", " and ".join(said), ""
     if not any(np.isfinite(item.low) for item in friction):
         subject, verbs = "B_eff", verbs.replace("take ", "takes ", 1)
@@ -269,7 +269,3 @@ def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivi
         return f"{subject} {rests}; {missed}"
     half = float(np.nanmedian([0.5 * (item.high - item.low) for item in friction]) / np.median(middle))
     return f"were the model exact, {subject} would reach {100 * half:.2g} % to either side and {rests}; {missed}"
-
-
-def _joined(items: Sequence[str]) -> str:
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

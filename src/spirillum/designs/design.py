@@ -282,17 +282,10 @@ def _deciding(unknowns: Mapping[str, Samples], values: Samples) -> dict[str, flo
     """Squared rank correlation (Spearman 1904) of every unknown with the objective's quantity."""
     from scipy.stats import rankdata
 
-    def centred(column: Samples) -> Samples:
-        ranks = rankdata(column)
-        return np.asarray(ranks - ranks.mean())
-
-    found = {}
-    own = centred(values)
-    for name, column in unknowns.items():
-        one = centred(column)
-        size = float(np.sqrt(np.sum(one**2) * np.sum(own**2)))
-        found[name] = float(np.sum(one * own) / size) ** 2 if size > 0 else 0.0
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        table = np.corrcoef([rankdata(column) for column in (values, *unknowns.values())])
+    shares = dict(zip(unknowns, np.nan_to_num(table[0, 1:] ** 2).tolist(), strict=True))
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 def _alternative(

@@ -6,7 +6,7 @@ all.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +28,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import OneModel, OneRobot, Part, gathered, groups
+from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, gathered, groups
 from spirillum.swimming.band import at_pose, band_poses, joined
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.steady import requirements, swim
@@ -56,6 +56,8 @@ class BandTask(OneModel):
     robots: tuple[RobotBatch, ...]
     """The robots at that pose, one by one."""
 
+    needed = frozenset(AT_POSES)
+
     @property
     def words(self) -> str:
         """Progress message."""
@@ -66,11 +68,6 @@ class BandTask(OneModel):
         """The pose in words."""
         placement = self.robots[0].placement
         return f"gap {show(placement.gap or 0.0, 'mm')}, pitch {show(placement.pitch or 0.0, 'deg')}"
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays of its answer."""
-        return set(AT_POSES)
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute steady swimming at this pose, (robots, friction models); NaN where there is none."""
@@ -167,8 +164,6 @@ def with_band(
     return found
 
 
-MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
-"""Quantities of both columns."""
 POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")
 """Pose and contact of a robot, means over a trial."""
 ENDS = ("median", "low", "high")
@@ -185,15 +180,12 @@ class HeldTask(OneRobot):
 
     placement: Placement
 
+    needed = frozenset(MOVING)
+
     @property
     def words(self) -> str:
         """Progress message."""
         return f"held, model {WALLED}: {self.robot.with_tail}"
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays of its answer."""
-        return set(MOVING)
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute every quantity, (1,); NaN for a robot outside the model's domain."""
@@ -219,7 +211,7 @@ class TrialTask(OneRobot):
         return f"trial{' with its interval' if self.interval else ''}: {self.robot.with_tail}"
 
     @property
-    def needed(self) -> set[str]:
+    def needed(self) -> Set[str]:
         """Names of the arrays of its answer."""
         ends = {f"{name}_{end}" for name in MOVING for end in ENDS} if self.interval else set()
         return {*MOVING, *POSE, "state", *ends}

@@ -233,12 +233,16 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     settings = json.loads(str(dataset.attrs.get("settings", "{}")))
     robots = settings.get("robots", [])
     walled = any(robot.get("channel") for robot in robots)
-    model = _model([str(name) for name in dataset["model"].values])
+    models, readings = ([str(name) for name in dataset[of].values] for of in ("model", "friction"))
+    of_walls = [name for name in models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
+    solved = [name for name in models if name in SWIMMER_MODELS and not SWIMMER_MODELS[name].closed_form]
+    model = (of_walls or solved or models)[0]
     own = [str((robot.get("friction") or {}).get("reading")) for robot in robots]
-    reading = _reading([str(name) for name in dataset["friction"].values], own)
+    reading = next((name for name in readings if name in own), readings[0])
     chosen = dataset.sel(model=model, friction=reading)
     names = list(_names(dataset))
-    known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
+    has_motor = bool(np.isfinite(chosen["motor_current"].values).any())
+    known = ["forward_velocity", "hydrodynamic_efficiency", "motor_current" if has_motor else "shaft_power"]
     beside = [name for name in _BESIDE if name in chosen and bool(np.isfinite(chosen[name].values).any())]
     known[1:1] = [name for name in beside if name != STEADY_SPEED]
     if STEADY_SPEED in beside:
@@ -262,21 +266,6 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     return StudyRanking(
         model, reading, walled and not placed, held, kind if ranked else "", tuple(ranked.values()), best
     )
-
-
-def _model(names: list[str]) -> str:
-    walled = [name for name in names if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
-    solved = [name for name in names if name in SWIMMER_MODELS and not SWIMMER_MODELS[name].closed_form]
-    return (walled or solved or names)[0]
-
-
-def _reading(names: list[str], own: list[str]) -> str:
-    return next((name for name in names if name in own), names[0])
-
-
-def _cost(chosen: xr.Dataset) -> str:
-    """The current where there is a motor, else the power at the shaft."""
-    return "motor_current" if bool(np.isfinite(chosen["motor_current"].values).any()) else "shaft_power"
 
 
 def _names(dataset: xr.Dataset) -> Iterator[str]:

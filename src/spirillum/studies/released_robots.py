@@ -37,7 +37,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.spec import Contact, LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import OneRobot, Part, gathered
+from spirillum.studies.work import MOVING, OneRobot, Part, gathered
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.released_motion import State
 from spirillum.swimming.steady import swim
@@ -80,15 +80,7 @@ WINDOWS = ("three turns", "whole run")
 """What a run is read over: the last two of the tail's first three turns, or the last two thirds of it all."""
 READ = (*FACTORS, "window")
 """What differs between the readings of a robot."""
-AT_RUNS = (
-    "forward_velocity",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "motor_rotation_rate",
-    "motor_current",
-    "azimuth",
-    "contact_share",
-)
+AT_RUNS = (*MOVING, "azimuth", "contact_share")
 """Quantities of each run and window."""
 INFERRED = ("effective_friction", "body_drag_factor", "modelled_forward_velocity", "modelled_body_rotation_rate")
 """What the paper's models make of the rates of a run."""
@@ -135,15 +127,12 @@ class ReleaseTask(OneRobot):
 
     ranges: LaidDown
 
+    needed = frozenset({*AT_RUNS, *INFERRED, "laid_pitch"})
+
     @property
     def words(self) -> str:
         """Progress message."""
         return f"runs after release: {self.robot.with_tail}"
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays of its answer."""
-        return {*AT_RUNS, *INFERRED, "laid_pitch"}
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`.
@@ -257,15 +246,7 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
     return [Note("without-answer", words, ("laid_down",))]
 
 
-SETTLED = (
-    "forward_velocity",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "motor_rotation_rate",
-    "motor_current",
-    "shaft_power",
-    "hydrodynamic_efficiency",
-)
+SETTLED = (*MOVING, "shaft_power", "hydrodynamic_efficiency")
 """Quantities of a steady motion."""
 POSE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
 """Pose of a robot in it, and its time constant."""
@@ -282,15 +263,12 @@ class SettledTask(OneRobot):
     contact: Contact
     """What it rests on."""
 
+    needed = frozenset({*SETTLED, *POSE, "error_estimate", "near", "state"})
+
     @property
     def words(self) -> str:
         """Progress message."""
         return f"steady state: {self.robot.with_tail}"
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays of its answer."""
-        return {*SETTLED, *POSE, "error_estimate", "near", "state"}
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -24,15 +24,9 @@ from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
 from spirillum.swimming.steady import STEADY, Swimming, requirements, speed_error, swim
 
-AT_RATES = (
-    "forward_velocity",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "motor_rotation_rate",
-    "motor_current",
-    "tail_torque",
-    "effective_friction",
-)
+MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
+"""Quantities of every motion."""
+AT_RATES = (*MOVING, "tail_torque", "effective_friction")
 """Quantities that are also given at observed and at assumed rates."""
 WITH_INTERVALS = (
     "forward_velocity",
@@ -76,6 +70,8 @@ REASONS = (
 )
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
 
+_ENDINGS = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
+"""What the names of a quantity's arrays end with."""
 BLOCK = 25_000
 """Robots of a task in closed form: a fifth of a second of work."""
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
@@ -120,11 +116,11 @@ class StudyTask(ABC):
 
     @property
     @abstractmethod
-    def needed(self) -> set[str]:
+    def needed(self) -> Set[str]:
         """Names of the arrays that every answer has."""
 
     @property
-    def allowed(self) -> set[str]:
+    def allowed(self) -> Set[str]:
         """Names of the arrays that an answer may have."""
         return self.needed
 
@@ -191,22 +187,13 @@ class ModelTask(OneModel):
     """One model for one block of robots of the same kind."""
 
     batch: RobotBatch
+    needed = frozenset({"outside", *(item.name for item in STEADY)})
+    allowed = frozenset({"outside", "error_estimate", *(item.name + at for item in STEADY for at in _ENDINGS)})
 
     @property
     def words(self) -> str:
         """Progress message."""
         return f"{self.model}, {self.size} robots"
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays that every answer has."""
-        return {"outside", *(item.name for item in STEADY)}
-
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-        endings = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
-        return {"outside", "error_estimate", *(item.name + at for item in STEADY for at in endings)}
 
     def job(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> StudyJob:
         """Return the task with its observations, and its robots where their posterior draws are requested."""
