@@ -198,13 +198,21 @@ static void add_dyad(double c, const double r[RATES], double matrix[RATES][RATES
         for (int j = 0; j < RATES; j++) matrix[i][j] += c * r[i] * r[j];
 }
 
+/* A point of the wire at xi. */
+static WirePoint crest_point(const Crest *c, double xi) {
+    const Station *at = c->at < c->last ? c->at : c->last - 1;
+    while (at > c->first && at->xi > xi) at--;
+    while (at + 1 < c->last && at[1].xi < xi) at++;
+    return wire_point(c->wire, at, c->y, c->rotation, xi);
+}
+
 /* A slice across the wire at xi, in a lane; its film spans `length`, m, along the wire.
  *
  * V is that of the gap, less the slope along the wire times the mean of both surfaces' velocities along it; u is that
  * across the wire, as seen from the contact line, which the wire's axis takes along. */
 static void add_slice_of_wire(const Crest *c, double xi, double span, double reach, Slices *s, int n,
                               double matrix[RATES][RATES]) {
-    const WirePoint p = wire_point(c->wire, c->at, c->y, c->rotation, xi);
+    const WirePoint p = crest_point(c, xi);
     const double b = c->wire->radius, *x = c->rotation[0];
     const double distance = sqrt(p.square), gap = larger(c->radius - distance - b, LEAST_FILM * b);
     if (gap >= reach) return;
@@ -251,7 +259,7 @@ bool add_crest_film(const Crest *c, const Nearest *nearest, Slices *slices, int 
     const double reach = CREST_REACH * c->wire->radius, gap = larger(nearest->gap, LEAST_FILM * c->wire->radius);
     if (gap >= reach) return false;
     const double from = c->first->xi, to = c->last->xi;
-    const WirePoint p = wire_point(c->wire, c->at, c->y, c->rotation, nearest->xi);
+    const WirePoint p = crest_point(c, nearest->xi);
     /* The gap along the wire: a parabola, with a slope at an end of it. */
     const double distance = sqrt(p.square), slope = fabs(p.first) / distance;
     const double bend = larger(-p.second / distance, LEAST_FILM * reach / squared(to - from));
@@ -294,10 +302,10 @@ EXPORT double crest_film(const double *y, const double *rotation, double radius,
                          const double *stations, const double *bracket, double viscosity, double bound,
                          const double *rates, double *force, int64_t count) {
     const double (*axes)[3] = (const double (*)[3])rotation;
-    const Station *first = (const Station *)stations;
-    const Crest crest
-        = {(const Wire *)wire, first, first, first + count - 1, (const State *)y, axes, radius, viscosity, bound};
-    const Nearest nearest = wire_nearest(crest.wire, first, crest.y, axes, radius, bracket);
+    const Station *first = (const Station *)stations, *last = first + count - 1, *at = first;
+    while (at + 1 < last && at[1].xi <= bracket[0]) at++;
+    const Crest crest = {(const Wire *)wire, at, first, last, (const State *)y, axes, radius, viscosity, bound};
+    const Nearest nearest = wire_nearest(crest.wire, at, crest.y, axes, radius, bracket);
     double matrix[RATES][RATES] = {{0.0}};
     Slices slices;
     clear_slices(&slices);

@@ -172,11 +172,10 @@ static double station_square(const Touch *t, const Station *station, double c, d
     return d[0] * d[0] + d[1] * d[1];
 }
 
-/* Add the film under a crest of a helix of one size that was found near a station: the curvature of other wires, cubics
- * between stations, has jumps, and so would the film. */
+/* Add the film under a crest of the wire that was found near a station. */
 static void add_crest(Touch *t, const Nearest *nearest, const Station *first, const Station *at, const Station *end) {
     const TubeRobot *robot = t->robot;
-    if (!t->resistance || robot->wire->hand_k == 0.0 || t->crest_count * LANES >= MOST_SLICES) return;
+    if (!t->resistance || t->crest_count * LANES >= MOST_SLICES) return;
     const Station *last = at;
     while (last < end && last[1].turn == at->turn) last++;
     const Crest crest = {robot->wire,
@@ -198,8 +197,7 @@ static void touch_wire(Touch *t) {
     const TubeRobot *robot = t->robot;
     const Tube *tube = robot->tube;
     const int64_t last = robot->station_count - 1;
-    const double reach = robot->wire->hand_k == 0.0 ? 0.0 : CREST_REACH * robot->wire->radius;
-    const double height = larger(tube->roughness, reach);
+    const double height = larger(tube->roughness, CREST_REACH * robot->wire->radius);
     if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, height)) return;
     const double c = cos(t->y->phase), s = sin(t->y->phase);
     double before = 0.0, here = station_square(t, robot->stations, c, s);

@@ -19,17 +19,26 @@ ALONG = 1.0 / (CURVATURE / (1.0 + WIRE * CURVATURE) - np.sin(SLOPE) ** 2 / TUBE)
 """Radii of the gap's curvature."""
 
 
-def film(gap: float, bound: float) -> tuple[float, np.ndarray]:
-    """Gap, and forces against the rates of a level robot whose crest is at the bottom of the tube."""
+def film(gap: float, bound: float, *, at: float = 30e-3, is_line: bool = False) -> tuple[float, np.ndarray]:
+    """Gap, and forces against the rates of a level robot whose crest is at the bottom of the tube.
+
+    Args:
+        gap: m.
+        bound: p_c, Pa.
+        at: of the crest from the root, m; the tip is at 60 mm.
+        is_line: whether the wire is cubics between its stations.
+    """
     xi = np.linspace(0.0, 60e-3, 121)
-    stations = np.zeros((xi.size, contacts.STATION))
-    stations[:, contacts.STATION_XI] = xi
-    wire = np.array([WIRE, AMPLITUDE, 0.0, K, 0.0, 60e-3])
+    angle, zero = -K * xi, np.zeros(xi.size)
+    point = [-xi, AMPLITUDE * np.cos(angle), AMPLITUDE * np.sin(angle)]
+    slope = [zero - 1.0, K * AMPLITUDE * np.sin(angle), -K * AMPLITUDE * np.cos(angle)]
+    stations = np.column_stack([xi, *point, *slope, zero])
+    wire = np.array([WIRE, AMPLITUDE, 0.0, 0.0 if is_line else K, 0.0, 60e-3])
     state, rates, force = np.zeros(rigid_links.STATES), np.zeros(7), np.empty(7)
     state[:3] = 0.0, 0.0, -(TUBE - WIRE - AMPLITUDE - gap)
     state[3], rates[JOINT] = 1.0, RATE
-    state[7] = -0.5 * np.pi + K * 30e-3  # the crest is in the middle
-    bracket = np.array([29e-3, 29.9e-3, 31e-3])
+    state[7] = -0.5 * np.pi + K * at
+    bracket = np.minimum(at + np.array([-0.5e-3, 0.0, 0.5e-3]), 60e-3)
     found = contacts.crest_film(state, np.eye(3), TUBE, wire, stations, bracket, OIL, bound, rates, force)
     return found, force
 
@@ -89,3 +98,13 @@ def test_a_crest_is_lifted_by_its_cavity(gap: float, bound: float) -> None:
 def test_there_is_no_film_beyond_its_reach() -> None:
     np.testing.assert_array_equal(film(0.76 * WIRE, 1e5)[1], 0.0)
     assert 0.0 < -film(0.74 * WIRE, 1e5)[1][JOINT] < 1e-3 * -film(1e-6, 1e5)[1][JOINT]
+
+
+@pytest.mark.parametrize("at", [30.1e-3, 60e-3])
+@pytest.mark.parametrize("bound", [np.inf, 1e4])
+def test_a_wire_along_points_of_a_helix_has_its_film(at: float, bound: float) -> None:
+    """In the middle, and at the tip."""
+    line, helix = (film(2e-6, bound, at=at, is_line=is_line) for is_line in (True, False))
+    assert line[0] == pytest.approx(helix[0], abs=1e-9)
+    size = np.abs(helix[1][:3]).max() * np.where(np.arange(7) < 3, 1.0, at)
+    np.testing.assert_allclose(line[1] / size, helix[1] / size, rtol=5e-3, atol=1e-3)
