@@ -43,7 +43,7 @@ from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
 from spirillum.swimming.preparation import preparation_time, table_for, why_no_table
-from spirillum.swimming.released_motion import HELD, SPEED_OF, ReleasedMotion, TrialInterval
+from spirillum.swimming.released_motion import ASSUMPTION, HELD, SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
 from spirillum.units import KINDS, as_given, parse_option, show, speed_unit
@@ -54,8 +54,6 @@ if TYPE_CHECKING:
     from spirillum.fluid.tube.table import TubeTable
 
 
-ASSUMPTION = "contact assumed, not validated"
-"""What a released motion rests on."""
 _POSE = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "azimuth": "azimuth"}
 """The pose of an answer, and where a run has it."""
 _OF_ONE_POSE = ("hydrodynamic_efficiency", "propulsive_power", "overall_efficiency")

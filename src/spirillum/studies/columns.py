@@ -14,7 +14,6 @@ import numpy as np
 
 from spirillum.arrays import Values
 from spirillum.dynamics.prediction import predict
-from spirillum.dynamics.trial import ASSUMPTION
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fluid.model import SwimmerModel
@@ -31,6 +30,7 @@ from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, gathered, groups
 from spirillum.swimming.band import at_pose, band_poses, joined
 from spirillum.swimming.model_choice import WALLED, has_table
+from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
 

@@ -23,6 +23,8 @@ from spirillum.quantities import QUANTITIES
 HELD = "held"
 RELEASED = "trial"
 """Motions of a robot in its tube, where a request takes one of both."""
+ASSUMPTION = "contact assumed, not validated"
+"""What a released motion rests on."""
 SPEED_OF = "speed, "
 """How a progress message begins that has the speed of a column: a terminal shows it as a line of its own."""
 

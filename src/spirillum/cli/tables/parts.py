@@ -171,14 +171,16 @@ def unsteady(answer: Answer) -> Iterator[str]:
         yield answer["lying"]["statement"]
 
 
-def resting_pose(lying: Answer) -> Iterator[Detail]:
-    """Final motion of a free robot; the line before it states its release."""
+def resting_pose(lying: Answer) -> Iterator[str]:
+    """Final motion of a free robot, and what it rests on; its pose on request."""
+    from spirillum.swimming.released_motion import ASSUMPTION  # brings the models
+
+    yield f"{_STATES[lying['state']].format(time=in_words(lying['followed_time']))}; {ASSUMPTION}"
     details = []
     for name, item in lying.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
             details.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
-    words = _STATES[lying["state"]].format(time=in_words(lying["followed_time"]))
-    yield Detail(f"{words}: {', '.join(details)}")
+    yield Detail(f"there: {', '.join(details)}")
 
 
 _WORDS = {

@@ -16,11 +16,11 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodF
 from spirillum.arrays import Values
 from spirillum.display import percent
 from spirillum.dynamics.comparison import RELEASED_EFFECT, ModelComparison, estimated_error
-from spirillum.dynamics.trial import ASSUMPTION
 from spirillum.errors import InputError
 from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
 from spirillum.swimming.model_choice import WALLED
 from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters
 from spirillum.view.figures.style import (
