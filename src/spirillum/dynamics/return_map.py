@@ -270,13 +270,10 @@ def _continued(chart: _Chart, x: Samples, free: np.ndarray, turns: float) -> _Ch
         new = chart.change(here.x + share * step)
         if new is not None and _size(step[free]) > _SMALL:
             new = chart.change(new.x + new.change)
-        if new is None:
-            turns *= 0.1
-            if turns < 1.0:  # not even the next turns can be followed from a pose nearby
-                return None
-            continue
-        turns *= float(np.clip(size / _size(new.change[free]), *_GROWTH))
-        here = new
+        turns *= 0.1 if new is None else float(np.clip(size / _size(new.change[free]), *_GROWTH))
+        if turns < 1.0:  # the run itself leads as far
+            return None
+        here = new or here
     return None
 
 
