@@ -37,6 +37,8 @@ RUNS = (
     ("wide", "100 kPa", "60 s"),
     ("wide", "100 kPa", "600 s"),
     ("wide", "10 kPa", "600 s"),
+    ("narrow", "100 kPa", "60 s"),
+    ("narrow", "100 kPa", "600 s"),
     ("narrow", "10 kPa", "600 s"),
 )
 """Preset, bound of the pressure and waiting time of each run."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
@@ -65,15 +66,15 @@ class ShortCylinder:
         under = np.sqrt(radius**2 - (y - side) ** 2)
         return np.sqrt(self.tube**2 - y**2) - below - under, -under, y - side
 
-    def velocity(self, motion: int, x: np.ndarray, across: np.ndarray) -> np.ndarray:
-        """Velocity of the body's surface for a unit motion of (U, Omega) about its middle, (3, ...)."""
+    def velocities(self, x: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Velocities of the body's surface for unit motions, (6, 3, ...): U, and Omega about its middle.
+
+        They roll about the body's axis, which is tilted, and turn otherwise about those of the tube.
+        """
         _, z, y = self.heights(x, across)
         r = np.stack(np.broadcast_arrays(x, y, z))
-        unit = np.zeros((3,) + (1,) * (r.ndim - 1))
-        unit[motion % 3] = 1.0
-        if motion < 3:
-            return np.broadcast_to(unit, r.shape)
-        return np.cross(np.broadcast_to(unit, r.shape), r, axis=0)
+        units = np.broadcast_to(np.eye(3).reshape((3, 3) + (1,) * (r.ndim - 1)), (3, *r.shape))
+        return np.concatenate([units, np.cross(units, r[None], axis=1)])
 
     def solve(self, rates: dict[int, float], viscosity: float, bound: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces of the pressure on the body (6,), and the pressure at the cells.
@@ -100,19 +101,52 @@ class ShortCylinder:
             active = now
         return sources @ (p * area), p
 
+    def affine(
+        self, rates: np.ndarray, viscosity: float, bound: float, active: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+        """Forces of pressure and shear, -K q + f as long as its cavity is that which is guessed.
+
+        Args:
+            rates: of the motions 0 to 5 (6,).
+            viscosity: Pa s.
+            bound: p_c, Pa.
+            active: cells that cavitate, a guess.
+
+        Returns:
+            K, f, the cells that cavitate at these rates and that pressure, and whether the guess was right.
+        """
+        matrix, sources, area = self._system(viscosity)
+        load, count = (sources * area).T, self.cells[1]
+        cavity = np.zeros(area.size, dtype=bool) if active is None else active
+        free, held = ~cavity, np.where(cavity, -bound if cavity.any() else 0.0, 0.0)
+        pressed = diags(free.astype(float)) @ matrix @ diags(free.astype(float)) + diags(cavity.astype(float))
+        bands = np.zeros((count + 1, area.size))
+        for below in (0, 1, count):
+            bands[below, : area.size - below] = pressed.diagonal(-below)
+        right = np.column_stack([-load, -(matrix @ held)]) * free[:, None]
+        found = cho_solve_banded((cholesky_banded(bands, lower=True), True), right)
+        per_rate, constant = found[:, :6], found[:, 6] + held
+        p = per_rate @ rates + constant
+        now = np.where(cavity, matrix @ p + load @ rates > 0.0, p < -bound)
+        return -load.T @ per_rate - self.shears(viscosity), load.T @ constant, now, bool((now == cavity).all())
+
     def shear(self, rates: dict[int, float], viscosity: float) -> np.ndarray:
-        """Generalised forces of the shear by the body's sliding (6,), fading out where the gap is no film."""
+        """Generalised forces of the shear by the body's sliding (6,)."""
+        return self.shears(viscosity) @ np.array([rates.get(motion, 0.0) for motion in range(6)])
+
+    def shears(self, viscosity: float) -> np.ndarray:
+        """The same per rate (6, 6), fading out where the gap is no film."""
         xm, ym = (
             0.5 * (edges[1:] + edges[:-1])[shape]
             for edges, shape in zip((self.x, self.lateral), ((slice(None), None), (None, slice(None))), strict=True)
         )
         h, z, y = self.heights(xm, ym)
-        v = np.stack([self.velocity(motion, xm, ym) for motion in range(6)])
+        v = self.velocities(xm, ym)
         around = (-z * v[:, 1] + y * v[:, 2]) / self.radius  # along the circumference
         share = viscosity / h / (1.0 + (h / (0.2 * self.radius)) ** 2)
-        area = np.diff(self.x)[:, None] * np.diff(self.lateral)[None] * self.radius / -z
-        moved = [sum(rate * part[motion] for motion, rate in rates.items()) for part in (v[:, 0], around)]
-        return -np.sum((v[:, 0] * moved[0] + around * moved[1]) * share * area, axis=(1, 2))
+        share = share * np.diff(self.x)[:, None] * np.diff(self.lateral)[None] * self.radius / -z
+        slid = np.stack([v[:, 0], around]).reshape(2, 6, -1)
+        return -np.einsum("kin,kjn,n->ij", slid, slid, share.ravel(), optimize=True)
 
     def _system(self, viscosity: float) -> tuple[csc_matrix, np.ndarray, np.ndarray]:
         x, y = self.x, self.lateral
@@ -131,11 +165,11 @@ class ShortCylinder:
         across[:, -1] = 0.0
         across = across.ravel()[:-1]
         matrix = diags([main, -along, -along, -across, -across], [0, ny, -ny, 1, -1], format="csc")
-        sources = np.stack([self._source(motion, x, y, xm, ym) for motion in range(6)])
+        sources = self._sources(x, y, xm, ym)
         return matrix, sources.reshape(6, nx * ny), (dx[:, None] * dy[None]).ravel()
 
-    def _source(self, motion: int, x: np.ndarray, y: np.ndarray, xm: np.ndarray, ym: np.ndarray) -> np.ndarray:
-        v = self.velocity(motion, xm[:, None], ym[None])
+    def _sources(self, x: np.ndarray, y: np.ndarray, xm: np.ndarray, ym: np.ndarray) -> np.ndarray:
+        v = self.velocities(xm[:, None], ym[None])
 
         def height(at_x: np.ndarray, at_y: np.ndarray) -> np.ndarray:
             """z_b at fixed places of the lab."""
@@ -144,20 +178,19 @@ class ShortCylinder:
             lateral = at_y + side + self.radius * side / np.hypot(side, self.offset - at_x * self.pitch)
             return h - np.sqrt(self.tube**2 - lateral**2)
 
-        def flux(at_x: np.ndarray, at_y: np.ndarray, axis: int) -> np.ndarray:
-            return 0.5 * self.heights(at_x, at_y)[0] * self.velocity(motion, at_x, at_y)[axis]
+        def flux(at_x: np.ndarray, at_y: np.ndarray) -> np.ndarray:
+            return 0.5 * self.heights(at_x, at_y)[0] * self.velocities(at_x, at_y)[:, :2]
 
         shear = self.yaw * self.tube / (self.tube - self.radius)  # d(nearest line)/dx, nearly constant
         dx, dy = np.diff(x)[:, None], np.diff(y)[None]
 
         def slopes(of_x: np.ndarray, of_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            d_y = np.diff(of_y, axis=1) / dy
-            return np.diff(of_x, axis=0) / dx - shear * d_y, d_y
+            d_y = np.diff(of_y, axis=-1) / dy
+            return np.diff(of_x, axis=-2) / dx - shear * d_y, d_y
 
         z_x, z_y = slopes(height(x[:, None], ym[None]), height(xm[:, None], y[None]))
-        q_x, _ = slopes(flux(x[:, None], ym[None], 0), flux(xm[:, None], y[None], 0))
-        _, q_y = slopes(flux(x[:, None], ym[None], 1), flux(xm[:, None], y[None], 1))
-        return np.broadcast_to(v[2] - v[0] * z_x - v[1] * z_y + q_x + q_y, z_x.shape)
+        q_x, q_y = slopes(flux(x[:, None], ym[None]), flux(xm[:, None], y[None]))
+        return v[:, 2] - v[:, 0] * z_x - v[:, 1] * z_y + q_x[:, 0] + q_y[:, 1]
 
 
 def film_of_run(moment: Any, cells: tuple[int, int] = (90, 90)) -> tuple[ShortCylinder, dict[int, float]]:
@@ -174,8 +207,10 @@ def film_of_run(moment: Any, cells: tuple[int, int] = (90, 90)) -> tuple[ShortCy
     to_middle = turned @ Rotation.from_euler("X", angles[0]).as_matrix().T
     spin = moment["angular_velocity"].values
     at = to_middle @ (moment["velocity"].values + np.cross(spin, 0.5 * (front - rear) * local[:, 0]))
-    rates = np.concatenate([at, turned @ local.T @ spin])
-    _, yaw, pitch = np.arcsin(to_middle @ local[:, 0])
+    axis = to_middle @ local[:, 0]
+    turning, roll = to_middle @ spin, float(local[:, 0] @ spin)
+    rates = np.concatenate([at, [roll], (turning - roll * axis)[1:]])
+    _, yaw, pitch = np.arcsin(axis)
     offset = float(np.hypot(*middle[1:]))
     size = (0.5 * body.diameter, front + rear, tube, offset, float(pitch), float(yaw))
     cylinder = ShortCylinder(*size, cells, body.rounding(body.front_end))
