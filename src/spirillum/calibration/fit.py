@@ -202,14 +202,13 @@ def _by_draws(
     problem: Problem, fit: LeastSquares, report: Identifiability, *, reading: str, posterior: Posterior | None
 ) -> Calibrated:
     """Estimates with intervals from draws: of a posterior, else in coordinates around the best fit."""
-    rng = np.random.default_rng(1)
+    rng, unusable = np.random.default_rng(1), list[Note]()
     if posterior is None:
         z, tau = sampled_fit(problem, fit, _FRICTION_DRAWS, rng)
         middle, error, of_a_trial, draws = fit.z, fit.error, fit.error, problem.values(z)
         values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(middle).items()}
         # Moments of a few residuals may give none, or one at the end of what may be: the middle of that is stated.
         discrepancy = {name: _middle(tau[name]) for name in fit.discrepancy}
-        unusable = []
     else:
         chosen = posterior.flat[rng.permutation(posterior.flat.shape[0])[:_FRICTION_DRAWS]]
         free = posterior.flat[:, : len(problem.coordinates)]

@@ -252,10 +252,10 @@ def body_outline(
     if shape in ("sphere", "spheroid"):
         return Outline((Arc((0.0, 0.0), (half, radius), (0.0, np.pi)),), ())
     nose = _end(front, half, 1.0, radius, fillet)
-    tail = [
+    tail: list[Segment | Arc] = [
         Segment(piece.end, piece.start)
         if isinstance(piece, Segment)
-        else Arc(piece.centre, piece.semi_axes, piece.angles[::-1])
+        else Arc(piece.centre, piece.semi_axes, (piece.angles[1], piece.angles[0]))
         for piece in reversed(_end(rear, -half, -1.0, radius, fillet))
     ]
     x_front, x_rear = nose[-1].points(np.ones(1))[0][0], tail[0].points(np.zeros(1))[0][0]
