@@ -24,6 +24,8 @@ WIDE = "biorob2012-wide"
         (["predict", "."], "is a folder"),
         (["predict", ""], "robot = ''; allowed: a preset"),
         (["predict", WIDE, "--plot", ""], "--plot '' is empty; allowed: --plot FILE"),
+        (["settle", WIDE, "-o", "a.png", "--plot", "b.png"], "is given twice; allowed: one FILE"),
+        (["predict", WIDE, "--plot", "a\x01b.png"], r"'a\x01b.png' holds a control character"),
         (["simulate", WIDE, "--output="], "--output '' is empty; allowed: --output FILE"),
         (["predict", WIDE, "--plot", "/proc/x.png"], "/proc/x.png cannot be written"),
         (["predict", WIDE, "--eccentricity", "1"], "placement.eccentricity = 1: gap = 0 mm; allowed: at least"),
@@ -247,7 +249,7 @@ def test_interrupt_that_a_library_has_caught_leaves_with_130(
 @pytest.mark.parametrize(
     ("command", "work", "words"),
     [
-        ("study -o out", "spirillum.studies.run.map_tasks", "finished robots are kept in out; the same"),
+        ("study -o out", "spirillum.studies.run.map_tasks", "robots that were finished are kept; the same"),
         ("prepare magnetic-helix", "spirillum.cli.renderer.progress_bar", "finished tables and poses are kept"),
         ("calibrate o.csv x.toml -o fit", "spirillum.robot.load.load", "nothing of this fit is kept"),
         ("predict magnetic-helix", "spirillum.dynamics.prediction.predict", "finished files are kept"),

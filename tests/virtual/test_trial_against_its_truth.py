@@ -87,6 +87,11 @@ def test_the_setup_is_one_and_knows_the_heights(trial: Any) -> None:
     assert setup.robot.axis_height == pytest.approx(0.022 - 0.020 + 0.009 + 0.0005)
 
 
+def test_a_setup_reads_back_the_name_of_its_robots_file(tmp_path: Path) -> None:
+    found = render(ROBOT, tmp_path / 'q"b\\c.mp4', **small(camera={"size": (96, 64)}))
+    assert load_setup(found.setup)[1] == load(ROBOT)
+
+
 def test_a_film_shows_what_predict_says_where_no_model_is_named() -> None:
     """In its tube, also where it has no table: here of a short, thick tail, which is solved for in no time."""
     asked = MotionOptions.of({"tail_rate": "1.2 Hz"})

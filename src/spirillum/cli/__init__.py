@@ -30,6 +30,7 @@ _INSTEAD = {
 """Sentences for options that only other commands have, by command and option."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
 """Errors of a name or location, not of the program."""
+_INTERRUPTED = 128 + signal.SIGINT
 _TERMINATED = 128 + signal.SIGTERM  # exit code after SIGTERM, which schedulers expect, however the command ends then
 _KEPT = "interrupted; finished files are kept"
 _AGAIN = 0.02  # after this time an interrupt that was dropped comes again, s
@@ -49,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _prepare()
         code = _run(arguments)
     except KeyboardInterrupt:  # while errors were being explained
-        code = _fail(_KEPT, 130)
+        code = _fail(_KEPT, _INTERRUPTED)
     if signal.SIGTERM in _interrupts:
         code = _TERMINATED
     if own:
@@ -150,6 +151,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         if code is None:
             raise
         return code
+    if code == _INTERRUPTED and _interrupts:  # while the command line was read, where its library says nothing
+        return _fail(_KEPT, _INTERRUPTED)
     return int(code or 0)
 
 

@@ -11,15 +11,14 @@ from typer.core import TyperCommand
 
 from spirillum.errors import InputError
 
-_RESUMED = "are kept in {}; the same command resumes"
 _KEPT = {
-    "calibrate": "nothing of this fit is kept; earlier results in {} stay",
+    "calibrate": "nothing of this fit is kept; earlier results stay",
     "design": "nothing of this search is kept",
     "prepare": "finished tables and poses are kept; the same command resumes",
-    "study": f"finished robots {_RESUMED}",
-    "virtual-experiment": f"finished videos {_RESUMED}",
+    "study": "robots that were finished are kept; the same command resumes",
+    "virtual-experiment": "videos that were finished are kept; the same command resumes",
 }
-"""Commands of minutes, with the end of their sentence; braces stand for the folder of results."""
+"""Commands of minutes, with the end of their sentence."""
 _PATHS = ("FILE", "DIR", "FOLDER.zarr")
 _NUMBER = re.compile(r"[\d.+-]+")  # also in digits of other scripts
 
@@ -34,6 +33,10 @@ class InterruptibleCommand(TyperCommand):
         """Return what is left of the arguments after the parameters took theirs."""
         takes = {name: one for one in self.params if not getattr(one, "is_flag", True) for name in one.opts}
         split = [part for text in args for part in (text.split("=", 1) if text.startswith("--") else [text])]
+        written = [takes[name] for name in split if name in takes and takes[name].metavar in _PATHS]
+        for one in written:
+            if written.count(one) > 1 and not one.multiple:
+                raise InputError(f"{' or '.join(one.opts)} is given twice; allowed: one {one.metavar}")
         for name, value in pairwise(split):
             if name in takes and not value.strip() and (kind := takes[name].metavar) in _PATHS:
                 raise InputError(f"{name} {value!r} is empty; allowed: {name} {kind}")
@@ -46,5 +49,4 @@ class InterruptibleCommand(TyperCommand):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
-            folder = ctx.params.get("store") or ctx.params.get("output")
-            raise typer.Abort(str(error) or _KEPT.get(str(ctx.info_name), "").format(folder)) from error
+            raise typer.Abort(str(error) or _KEPT.get(str(ctx.info_name), "")) from error

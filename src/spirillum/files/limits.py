@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import unicodedata
 from collections.abc import Collection
 from pathlib import Path
 
@@ -50,6 +51,8 @@ def checked_path(path: str | os.PathLike[str], what: str) -> Path:
     if "\0" in name or len(name) > LONGEST_PATH:
         wrong = "holds a null character" if "\0" in name else f"has {len(name)} characters"
         raise InputError(f"{name[:80]!r} {wrong}; allowed: {what}")
+    if any(unicodedata.category(letter) == "Cc" for letter in name):
+        raise InputError(f"{name[:80]!r} holds a control character; allowed: {what}")
     if not is_text(name):
         raise InputError(f"{name[:200]!a} is not text; allowed: a name that is text in UTF-8, as results carry it")
     longest = max(len(part.encode()) for part in Path(name).parts or ("",))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -60,7 +61,7 @@ def setup_text(
         'height = "0 mm"',
         "",
         "[robot]",
-        f'file = "{robot_file}"',
+        f"file = {json.dumps(robot_file, ensure_ascii=False)}",  # a string of JSON is one of TOML
         f"axis_height = {_mm(height)}",
         *([f"axis_height_uncertainty = {_mm(uncertainty)}"] if uncertainty > 0 else []),
         f'direction = "{camera.direction}"',
