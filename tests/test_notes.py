@@ -68,12 +68,12 @@ def test_notes_survive_processes_prefixes_and_datasets() -> None:
 
 def test_the_weightiest_cautions_take_three_rows() -> None:
     notes = [
-        Note("misfit", "m" * 60),
+        Note("outlier", "m" * 60),
         Note("interpolated", "i"),
         Note("walls-left-out", "w" * 150),
-        Note("misfit", "n"),
+        Note("outlier", "n"),
     ]
-    assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "misfit"]
+    assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "outlier"]
     assert [note.code for note in shown_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
     video = [Note(code, "v" * 100) for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
     assert [note.code for note in shown_cautions(video)] == ["robot-stands-still"]  # what it shows outweighs the rest

@@ -134,12 +134,17 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
     model = problem.model.name
     for name, size in discrepancy.items():
         called, code = CALLED[name], "intervals-incomplete"
+        large = min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT  # by the residuals, and not the prior alone
+        one = np.count_nonzero(problem.ratio(name).seen) == 1
+        if min(size.value, fit.discrepancy[name]) > _BEYOND_TRIALS and (one or fit.left[name] < FEWEST_LEFT):
+            words = f"'{model}' misses the {called} by {percent(fit.discrepancy[name])}: the fit does not describe it"
+            found.append(Note("misfit", words, (name,)))
         if fit.left[name] < FEWEST_LEFT:
             words = (
                 f"the fit has as many free numbers as means of the {called}: the misfit of '{model}' is unknown, and a "
                 "typical one is used; measure more tails"
             )
-        elif np.count_nonzero(problem.ratio(name).seen) == 1:
+        elif one:
             words = (
                 f"one tail's {called} does not tell the misfit of '{model}': a typical one is used; measure more tails"
             )
@@ -150,7 +155,7 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
             if size.value > _BEYOND_TRIALS:
                 found.append(Note(code, words, (name,)))
                 code, words = "misfit", _misfit(model, called, size.value, "more than trials err")
-        elif min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT:  # by the residuals, and not the prior alone
+        elif large:
             code, words = "misfit", _misfit(model, called, size.value, "beyond the scatter of trials")
         else:
             continue
@@ -273,8 +278,8 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note
     open_below = [n for n, item in enumerate(friction) if item.low < 0 <= item.value]
     if open_below:
         words = (
-            f"the interval of B_eff of {experiment.labels()[open_below[0]]}{', ...' if len(open_below) > 1 else ''} "
-            "reaches below zero, where friction has no meaning: predictions use zero there; repeat trials"
+            f"B_eff of {experiment.labels()[open_below[0]]}{', ...' if len(open_below) > 1 else ''} may be zero or less, "
+            "which has no meaning: the observations do not determine it; repeat trials"
         )
         found.append(Note("friction-negative", words, ("friction",)))
     if problem.interpolation_error > 0:
