@@ -115,7 +115,7 @@ _PLACES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1
 _FULL_INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
-def _rgba(colour: Samples) -> str:
+def _rgba(colour: Sequence[float]) -> str:
     return numbers([*np.round(colour, 4), 1.0])
 
 

@@ -210,7 +210,7 @@ class TiltedRings(Rings):
         The 2 stands for the real and the imaginary part; parities of waves are those of the system's families. Steep
         waves are damped but where a ring nears the wall: they are evaluated on that arc only.
         """
-        symmetric = self.pose.yaw == 0
+        symmetric = bool(self.pose.yaw == 0)
         theta = midpoints(orders, tier.modes, whole=not symmetric)
         onto = _onto_modes(theta, tier.modes, precision, symmetric=symmetric)
         panels, order = len(sample.x), sample.x.shape[1] if sample.average is None else sample.average.shape[1]
