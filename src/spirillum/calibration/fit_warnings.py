@@ -278,8 +278,8 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note
     open_below = [n for n, item in enumerate(friction) if item.low < 0 <= item.value]
     if open_below:
         words = (
-            f"B_eff of {experiment.labels()[open_below[0]]}{', ...' if len(open_below) > 1 else ''} may be zero or less, "
-            "which has no meaning: the observations do not determine it; repeat trials"
+            f"B_eff of {experiment.labels()[open_below[0]]}{', ...' if len(open_below) > 1 else ''} may be zero or "
+            "less, which has no meaning: the observations do not determine it; repeat trials"
         )
         found.append(Note("friction-negative", words, ("friction",)))
     if problem.interpolation_error > 0:
