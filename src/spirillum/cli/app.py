@@ -28,6 +28,7 @@ from spirillum.cli.shared_options import (
     complete_resistance_models,
 )
 from spirillum.cli.view_commands import film, flow, page, show
+from spirillum.errors import InputError
 
 _ROWS = 10
 
@@ -123,6 +124,8 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
+    if plot is not None and calibrated:
+        raise InputError("--plot with --calibrated: effects need models without factors; allowed: one of them")
     draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.comparison:effects_figure")
     check_apart(output, plot)
     with renderer.progress_bar(quiet=json) as progress:
