@@ -134,12 +134,12 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
     model = problem.model.name
     for name, size in discrepancy.items():
         called, code = CALLED[name], "intervals-incomplete"
-        large = min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT  # by the residuals, and not the prior alone
-        one = np.count_nonzero(problem.ratio(name).seen) == 1
-        if min(size.value, fit.discrepancy[name]) > _BEYOND_TRIALS and (one or fit.left[name] < FEWEST_LEFT):
+        misfit = min(size.value, fit.discrepancy[name])  # by the residuals, and not the prior alone
+        few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).seen) == 1
+        if (few or one) and misfit > _BEYOND_TRIALS:
             words = f"'{model}' misses the {called} by {percent(fit.discrepancy[name])}: the fit does not describe it"
             found.append(Note("misfit", words, (name,)))
-        if fit.left[name] < FEWEST_LEFT:
+        if few:
             words = (
                 f"the fit has as many free numbers as means of the {called}: the misfit of '{model}' is unknown, and a "
                 "typical one is used; measure more tails"
@@ -155,7 +155,7 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
             if size.value > _BEYOND_TRIALS:
                 found.append(Note(code, words, (name,)))
                 code, words = "misfit", _misfit(model, called, size.value, "more than trials err")
-        elif large:
+        elif misfit > _LARGE_MISFIT:
             code, words = "misfit", _misfit(model, called, size.value, "beyond the scatter of trials")
         else:
             continue

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Predicted:
-    """What draws of the parameters predict, (draws, robots)."""
+    """Predictions at draws of the parameters, (draws, robots)."""
 
     advance: Samples
     turning: Samples
@@ -71,7 +71,7 @@ class Predicted:
 
 @dataclass(frozen=True)
 class DryContact:
-    """What dry friction under the robots depends on, beside its coefficient."""
+    """Quantities on which dry friction under the robots depends, beside its coefficient."""
 
     weight: PerRobot
     """Weight in the fluid, N."""

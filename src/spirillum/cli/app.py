@@ -28,7 +28,6 @@ from spirillum.cli.shared_options import (
     complete_resistance_models,
 )
 from spirillum.cli.view_commands import film, flow, page, show
-from spirillum.errors import InputError
 
 _ROWS = 10
 
@@ -111,6 +110,7 @@ def predict(request: Request, *, plot: Path | None = None, all_of_it: All = Fals
 def compare_models(
     request: Request,
     *,
+    context: typer.Context,
     output: Path | None = None,
     plot: Path | None = None,
     calibrated: bool = False,
@@ -124,8 +124,8 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
-    if plot is not None and calibrated:
-        raise InputError("--plot with --calibrated: effects need models without factors; allowed: one of them")
+    if calibrated:
+        refuse_conflicts(context, "calibrated")
     draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.comparison:effects_figure")
     check_apart(output, plot)
     with renderer.progress_bar(quiet=json) as progress:

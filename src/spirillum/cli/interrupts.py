@@ -30,7 +30,7 @@ class InterruptibleCommand(TyperCommand):
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return what is left of the arguments after the parameters took theirs."""
+        """Return the arguments that no parameter takes."""
         takes = {name: one for one in self.params if not getattr(one, "is_flag", True) for name in one.opts}
         split = [part for text in args for part in (text.split("=", 1) if text.startswith("--") else [text])]
         written = [takes[name] for name in split if name in takes and takes[name].metavar in _PATHS]

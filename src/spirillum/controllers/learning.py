@@ -30,7 +30,7 @@ from spirillum.controllers.sensors import Command, Controller, Detection, Messag
 from spirillum.envelope import quantity
 
 BLOCK = 1.0  #: Length of a block, s.
-SETTLING = 0.3  #: What is seen so soon after the drive was switched is left out, s.
+SETTLING = 0.3  #: Readings within this time after a switch of the drive are left out, s.
 _FEWEST = 4  # frames of a block at least
 _BANK_ERROR = 1e-2
 """Relative standard deviation of the bank's rates of tail and body: interpolation, a pulse of flow, which lifts the

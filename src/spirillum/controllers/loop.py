@@ -56,7 +56,7 @@ class LoopRun:
 
     moments: list[Snapshot] = field(default_factory=list)  #: The robot after each event that moved it, in order of time
     flows: list[float] = field(default_factory=list)  #: Flow that is imposed up to each of them, m/s; 0: none.
-    frames: list[tuple[float, Detection | None]] = field(default_factory=list)  #: Times of the frames and what was seen
+    frames: list[tuple[float, Detection | None]] = field(default_factory=list)  #: Frames, s, and detections
     readings: list[MeterReading] = field(default_factory=list)  #: Readings of the meter.
     decisions: list[Decision] = field(default_factory=list)  #: Decisions of the controller.
     lost: int = 0  #: Commands that did not arrive.

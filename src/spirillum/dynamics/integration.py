@@ -36,7 +36,7 @@ Progress = Callable[[str, int, int], None]
 
 
 class Event(NamedTuple):
-    """What happened in a run, and when, s."""
+    """Events of a run and their times, s."""
 
     time: float
     what: str

@@ -88,6 +88,6 @@ def balanced(
     rows: Float64[Array, "count 2 7"],  # J_c, sliding velocities along the tube and around it per rate
     slow: float,  # v_r, m/s
     q: Float64[Array, "7"],  # first guess, and the result
-    left: Float64[Array, "7"],  # result, what is left of the forces
+    left: Float64[Array, "7"],  # result, the remaining forces
 ) -> float:
     """Find the rates q at which A q and dry friction balance the force; return the rest of the forces, over them."""

@@ -218,16 +218,16 @@ class TiltedRings(Rings):
         some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
         for first in range(0, panels, some):
             chunk = slice(first, first + some)
+            there = slice(first * order, (first + some) * order)
+            average = None if sample.average is None else sample.average[chunk].astype(precision)
             rings = self._around(sample.x[chunk].ravel(), sample.rho[chunk].ravel(), theta)
             distances = distances_of(rings.reshape(-1, 3), waves.radius).reshape(rings.shape[:2]).min(axis=0)
             for low, high, arc in waves.bands(number, distances, away, orders):
                 field = self._waves(waves, number, theta[arc], rings[:, arc], low, high, precision)
                 values = np.matmul(field.reshape(2, 3, -1, arc.size), onto[:, :, arc])
-                if sample.average is not None:
-                    average = sample.average[chunk].astype(precision)
+                if average is not None:
                     values = np.matmul(average, values.reshape(2, 3, len(average), average.shape[2], -1))
                 values = values.reshape(2, 3, -1, high - low, 2, 3, onto.shape[-1])
-                there = slice(first * order, (first + some) * order)
                 modes[low:high, :, :, :, :, there] = values.transpose(3, 0, 4, 5, 1, 2, 6)
         flat = modes.reshape(orders, 2, 2, 3, -1)
         if symmetric:

@@ -31,7 +31,7 @@ class FalseDetectionConstants:
     leaves: float = 1.0
     """Distance from the path of the marked frames from which on the outline has left the robot, pixels."""
     scatters: float = 6.0
-    """The same, over the scatter of the marked frames about their path."""
+    """Distance from which on it has left the robot, over the scatter of the marked frames about their path."""
 
 
 FALSE_DETECTION = FalseDetectionConstants()
