@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from spirillum.data_tables import rows_of
+
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "src" / "spirillum"
 MODULES = sorted(PACKAGE.rglob("*.py"))
@@ -31,6 +33,12 @@ def test_no_module_defines_a_name_twice() -> None:
 @pytest.mark.parametrize("name", ["answer", "options", "warnings", "loading"])
 def test_general_module_names_occur_once_at_most(name: str) -> None:
     assert len(list(PACKAGE.rglob(f"{name}.py"))) <= 1
+
+
+def test_every_requirement_of_the_table_is_used() -> None:
+    source = "\n".join(path.read_text("utf-8") for path in MODULES)
+    used = re.findall(r"Limit\.named\(\s*\"([\w-]+)\"", source)
+    assert sorted(used) == sorted(row["name"] for row in rows_of("limits.csv"))
 
 
 def test_every_path_of_the_map_exists() -> None:

@@ -179,24 +179,8 @@ class Manufacturability(Options):
         curvature = coil_curvature(batch.wavelength, batch.amplitude)
         clearance = wire if self.clearance is None else np.full(1, self.clearance)
         return [
-            Limit.of(
-                "tail.amplitude",
-                batch.amplitude,
-                "at most",
-                0.5 * (batch.channel_diameter - wire) - clearance,
-                "mm",
-                "a tail on the tube's axis keeps bench.clearance off the glass",
-                "too-near-the-glass",
-            ),
-            Limit.of(
-                "radius of curvature of the tail",
-                1.0 / curvature,
-                "at least",
-                0.5 * (1.0 + self.mandrel) * wire,
-                "mm",
-                "the wire is bent around no less than bench.mandrel of its diameters",
-                "bent-too-tightly",
-            ),
+            Limit.named("tail-off-glass", batch.amplitude, 0.5 * (batch.channel_diameter - wire) - clearance),
+            Limit.named("mandrel", 1.0 / curvature, 0.5 * (1.0 + self.mandrel) * wire),
         ]
 
 

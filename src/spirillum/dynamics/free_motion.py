@@ -18,7 +18,7 @@ from spirillum.dynamics.integration import Progress, Reach, integrate, observed_
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.run_summary import DutyInterval
-from spirillum.dynamics.start import InitialPose, check_in_table, check_roughness, state_at_release
+from spirillum.dynamics.start import InitialPose, released_state
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -53,7 +53,6 @@ from spirillum.units import KINDS, parse_option, show
 _SAMPLES = 240
 """Samples of a turn over which means are taken."""
 _MOST_SAMPLES = 20_000
-_NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _FEW_TURNS = 6
 """Turns of the tail within which a trial reaches its steady motion."""
 _LIGHT = 1e-9
@@ -133,9 +132,7 @@ def free_motion(
     table = table_for(batch, progress=progress)
     release = Release(table, placed, requested, height, contact, tail_rate, friction, weight)
     held, links, start = prepare_release(ready, release)
-    state = state_at_release(ready, links, start)
-    check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
-    check_in_table(links, state, observed_at(links, state)[rigid_links.OUTSIDE])
+    state = released_state(ready, links, start)
     gap = float(observed_at(links, state)[rigid_links.FILM])
     _check_until(until, gap)
     load_size = abs(float(links.weight[: rigid_links.MOMENT_BODY].sum())) * links.length
@@ -231,7 +228,7 @@ def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, 
     start = state.copy()
     start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0
     start[rigid_links.CURRENT + 1 :] = 0.0
-    followed = integrate(links, start, moments, [Switch(0.0, duty)], _NOWHERE)
+    followed = integrate(links, start, moments, [Switch(0.0, duty)], Reach())
     more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
     series = dataset_of(held, links, followed, [DutyInterval(0.0, float(followed.time[-1]))], more, {})
 

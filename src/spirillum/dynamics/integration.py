@@ -43,17 +43,17 @@ class Event(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """What ends a run, or its drive."""
+    """What ends a run, or its drive; by default nothing does."""
 
-    nose: float
+    nose: float = 0.0
     """Position of the nose's tip on the motor axis, m."""
-    tip: float
+    tip: float = 0.0
     """Position of the tail's tip, m."""
-    channel: float
+    channel: float = np.inf
     """Half the channel's length, m; infinite without one."""
-    middle: float
+    middle: float = 0.0
     """Position of the channel's middle, m."""
-    charge: float
+    charge: float = np.inf
     """Charge of the battery, A s; infinite without a rating."""
 
 

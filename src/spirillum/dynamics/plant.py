@@ -26,19 +26,16 @@ from spirillum.dynamics.integration import (
     Reach,
     Trajectory,
     integrate,
-    observed_at,
 )
 from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.start import (
     InitialPose,
-    check_in_table,
-    check_roughness,
     links_without_walls,
     reach_of,
+    released_state,
     resting_state,
-    state_at_release,
 )
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube
@@ -184,10 +181,7 @@ class Plant:
             first = resting_state(own, without_walls, placed)
         else:
             links, start = self._in(self._table, placed)
-            first = state_at_release(own, links, start)
-            check_roughness(links.roughness, float(links.gaps(first).min()), self.robot.body.diameter)
-            check_in_table(links, first, observed_at(links, first)[rigid_links.OUTSIDE])
-            self._links = links
+            self._links, first = links, released_state(own, links, start)
         on = own.drive.duty
         self._first = PlantState(
             time=0.0,

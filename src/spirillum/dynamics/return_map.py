@@ -30,7 +30,6 @@ _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
 _MOST_STEPS = 75_000
 """Steps in time of a run and of all searches for its fixed point: some 1,300 turns, fewer where the tail touches."""
-_NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _COUNTED = [rigid_links.POSITION, rigid_links.ROLL, *range(rigid_links.CURRENT + 1, rigid_links.STATES)]
 """What counts from the start of a turn."""
 
@@ -93,7 +92,7 @@ class ReturnMap:
     def after(self, state: Samples) -> Turn:
         """The next turn of the tail from a state, (19,); `EndedTurnError` if it cannot be followed to its end."""
         robot, data = self.robot, self.robot.data
-        limits, sizes = watched_limits(robot, _NOWHERE), robot.step_sizes()
+        limits, sizes = watched_limits(robot, Reach()), robot.step_sizes()
         y = state.copy()
         y[_COUNTED] = 0.0
         memory = np.zeros(stiff_steps.MEMORY)

@@ -129,7 +129,6 @@ def in_tilted_field(links: _A, requested: Field) -> _A:
 _TILT = 0.1
 """Angle by which the robot is pushed before every rate, rad: else it could stay in an unstable balance."""
 _SAMPLES = 64
-_OPEN = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _SETTLED = 1e-3
 """Largest relative change of the velocity from one stretch to the next."""
 _STILL = 1e-4
@@ -308,7 +307,7 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
     before = None
     for _ in range(_MOST_STRETCHES):
         try:
-            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN).require_completion()
+            run = integrate(here, start, time, [Switch(0.0, 1.0)], Reach()).require_completion()
         except InputError as error:
             raise InputError(
                 f"rates: at {show(rate, 'Hz')} {str(error).partition(';')[0]}; allowed: rates nearer to step-out"

@@ -8,7 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import TwoLinks, two_links
-from spirillum.dynamics.integration import Reach
+from spirillum.dynamics.integration import Reach, observed_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.fluid.tube.library import THINNEST_GAP
@@ -204,14 +204,17 @@ def check_roughness(roughness: float, gap: float, diameter: float) -> None:
         )
 
 
-def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
-    """Refuse a start that the table does not hold."""
-    if outside:
-        gap = float(links.gaps(state).min())
+def released_state(robot: Robot, links: TubeRobot, start: InitialPose) -> Samples:
+    """The state of a robot at rest at a pose that its asperities allow and its table holds, (19,)."""
+    state = state_at_release(robot, links, start)
+    gap = float(links.gaps(state).min())
+    check_roughness(links.roughness, gap, robot.body.diameter)
+    if observed_at(links, state)[rigid_links.OUTSIDE]:
         raise InputError(
             f"placement: a gap of {show(gap, 'mm')} with that pitch and yaw lies outside the robot's table; allowed: a "
             "pose nearer to level"
         )
+    return state
 
 
 def state_at(start: InitialPose, offset: float) -> Samples:

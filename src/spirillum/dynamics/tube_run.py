@@ -17,12 +17,11 @@ from spirillum.dynamics.integration import (
     Reach,
     Trajectory,
     integrate,
-    observed_at,
 )
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.run_summary import stretches_on
-from spirillum.dynamics.start import InitialPose, check_in_table, check_roughness, reach_of, state_at_release
+from spirillum.dynamics.start import InitialPose, reach_of, released_state
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
@@ -67,10 +66,7 @@ def tube_run(
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
     if isinstance(start, InitialPose):
-        released = state_at_release(steady.robot, robot, start)
-        check_roughness(robot.roughness, float(robot.gaps(released).min()), steady.robot.body.diameter)
-        check_in_table(robot, released, observed_at(robot, released)[rigid_links.OUTSIDE])
-        first, before = _waited(robot, released, wait, reach, progress)
+        first, before = _waited(robot, released_state(steady.robot, robot, start), wait, reach, progress)
     else:
         first = _checkpoint(start)
         moments = np.append(float(start["time"][-1]), moments[moments > float(start["time"][-1])])

@@ -1,19 +1,23 @@
-"""Requirements on robots, over arrays: field, value, allowed range, reason."""
+"""Requirements on robots, over arrays: field, value, allowed range, reason. Their words stand in `limits.csv`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from spirillum.arrays import Flags, PerRobot
+from spirillum.data_tables import rows_of
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
 from spirillum.robot.tail_form import ROOT_SHARE, closest_strands, strand_spacing
 from spirillum.units import show, show_apart
+
+_WORDS: dict[str, dict[str, Any]] = {row.pop("name"): dict(row) for row in rows_of("limits.csv")}
+"""Field, relation, unit, reason and flag of requirements by their names."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,12 @@ class Limit:
         else:
             holds = np.abs(value - limit) <= slack
         return cls(field, value, relation, limit, unit, why, holds, flag)
+
+    @classmethod
+    def named(cls, name: str, value: PerRobot, bound: PerRobot | float, /, **words: Any) -> Limit:
+        """Require what `limits.csv` states under a name, with `words` in its texts."""
+        row = {column: text.format(**words) if words else text for column, text in _WORDS[name].items()}
+        return cls.of(value=value, bound=bound, **row)
 
     def caution(self, index: int = 0) -> Note:
         """The note where an answer is given although the requirement is broken, for robot number `index`."""
@@ -107,85 +117,30 @@ def within(batch: RobotBatch, limits: Iterable[Limit] = ()) -> list[int]:
 
 
 def _channel_limits(b: RobotBatch) -> list[Limit]:
-    fits = "has to fit into channel.diameter"
     across = 0.5 * (b.channel_diameter - b.wire_diameter)
-    along = b.channel_length - b.body_length - b.coupling_length
+    behind = b.channel_length - b.coupling_length
     return [
-        Limit.of(
-            "body.diameter",
-            b.body_diameter,
-            "less than",
-            b.channel_diameter,
-            "mm",
-            f"the body {fits}",
-            "body-wider-than-channel",
+        Limit.named("body-in-channel", b.body_diameter, b.channel_diameter),
+        Limit.named("coupling-in-channel", b.coupling_diameter, b.channel_diameter),
+        Limit.named(
+            "tail-in-channel", b.amplitude, across, tail="tail.curve: amplitude" if b.form.curve else "tail.amplitude"
         ),
-        Limit.of(
-            "coupling.diameter",
-            b.coupling_diameter,
-            "less than",
-            b.channel_diameter,
-            "mm",
-            f"the coupling {fits}",
-            "coupling-wider-than-channel",
-        ),
-        Limit.of(
-            "tail.curve: amplitude" if b.form.curve else "tail.amplitude",
-            b.amplitude,
-            "less than",
-            across,
-            "mm",
-            f"the tail with half its wire {fits}",
-            "tail-wider-than-channel",
-        ),
-        Limit.of(
-            "body.length",
-            b.body_length,
-            "less than",
-            b.channel_length - b.coupling_length,
-            "mm",
-            "body and coupling have to fit into channel.length with a tail behind them",
-            "robot-longer-than-channel",
-        ),
-        Limit.of(
-            "tail.length",
-            b.tail_length,
-            "at most",
-            along,
-            "mm",
-            "body, coupling and tail together have to fit into channel.length",
-            "robot-longer-than-channel",
-        ),
+        Limit.named("body-along-channel", b.body_length, behind),
+        Limit.named("robot-along-channel", b.tail_length, b.channel_length - b.body_length - b.coupling_length),
     ]
 
 
 def _body_limits(b: RobotBatch) -> list[Limit]:
     coupled = b.coupling_length > 0
-    clearance = Limit.of(
-        "coupling.clearance",
-        np.where(coupled, b.coupling_clearance, 0.0),
-        "less than",
-        np.where(coupled, 0.5 * b.coupling_length, np.inf),
-        "mm",
-        "it is left free on both sides within coupling.length",
-        "clearance-too-large",
-    )
+    room = np.where(coupled, 0.5 * b.coupling_length, np.inf)
+    limits = [Limit.named("coupling-clearance", np.where(coupled, b.coupling_clearance, 0.0), room)]
     if b.shape in ("spheroid", "profile", "none"):
-        return [clearance]
+        return limits
     if b.shape == "sphere":
-        why = "a sphere is as long as its diameter"
-        return [
-            Limit.of("body.length", b.body_length, "exactly", b.body_diameter, "mm", why, "sphere-not-round"),
-            clearance,
-        ]
-    fillet = "an edge radius is at most the body's radius"
-    ends = "both ends have to fit into the overall length"
+        return [Limit.named("sphere", b.body_length, b.body_diameter), *limits]
     shortest = shortest_body(b.body_diameter, b.fillet, b.front, b.rear)
-    return [
-        Limit.of("body.fillet", b.fillet, "at most", 0.5 * b.body_diameter, "mm", fillet, "fillet-too-large"),
-        Limit.of("body.length", b.body_length, "at least", shortest, "mm", ends, "body-shorter-than-ends"),
-        clearance,
-    ]
+    ends = Limit.named("body-ends", b.body_length, shortest)
+    return [Limit.named("fillet", b.fillet, 0.5 * b.body_diameter), ends, *limits]
 
 
 def _spacing_and_curvature(b: RobotBatch) -> tuple[PerRobot, PerRobot]:
@@ -210,33 +165,9 @@ def _tail_limits(b: RobotBatch) -> list[Limit]:
     spacing, curvature = _spacing_and_curvature(b)
     whose = " of tail.curve" if b.form.curve else " of the coil (tail.wavelength, tail.amplitude)"
     between = " or wires (tail.starts)" if b.form.starts > 1 else ""
-    bend = "curve's" if b.form.curve else "coil's"
+    tightest = np.divide(2.0, curvature, out=np.full_like(curvature, np.inf), where=curvature > 0)
     return [
-        Limit.of(
-            "tail.wire_diameter",
-            b.wire_diameter,
-            "less than",
-            spacing,
-            "mm",
-            f"neighbouring turns{whose}{between} would touch",
-            "turns-touch",
-        ),
-        Limit.of(
-            "tail.wire_diameter",
-            b.wire_diameter,
-            "less than",
-            np.divide(2.0, curvature, out=np.full_like(curvature, np.inf), where=curvature > 0),
-            "mm",
-            f"the wire's radius has to stay below the {bend} radius of curvature",
-            "wire-too-thick-for-coil",
-        ),
-        Limit.of(
-            "tail.length",
-            b.tail_length,
-            "less than",
-            1000.0 * b.wavelength,
-            "mm",
-            "a tail has at most 1000 turns of tail.wavelength",
-            "too-many-turns",
-        ),
+        Limit.named("wire-between-turns", b.wire_diameter, spacing, whose=whose, between=between),
+        Limit.named("wire-in-bend", b.wire_diameter, tightest, bend="curve's" if b.form.curve else "coil's"),
+        Limit.named("turns", b.tail_length, 1000.0 * b.wavelength),
     ]

@@ -44,8 +44,7 @@ def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Sw
     pulled = 0.5 * robot.fluid.viscosity * a * np.abs(result.body_rotation_rate)
     least = (1.837 * pulled * np.sqrt(a * radius / (radius - a)) / bound) ** (2.0 / 3.0)
     gap = np.atleast_1d(gap_of(batch.placement, 2.0 * a, radius))
-    why = "the liquid cavitates in thinner films, which motion 'free' counts"
-    return [Limit.of("placement.gap", gap, "at least", least, "um", why, "film-cavitates")]
+    return [Limit.named("cavitation", gap, least)]
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[Note]:

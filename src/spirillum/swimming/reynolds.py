@@ -23,7 +23,6 @@ LOW_REYNOLDS = 0.1
 """Reynolds number above which an answer has a warning."""
 BEYOND_STOKES = 10.0
 """Reynolds number above which inertia dominates: an answer is refused unless `beyond_stokes` is set."""
-_INERTIA = "inertia is neglected (Stokes flow)"
 _BODY, _TAIL, _FLOW = "reynolds-number", "tail-reynolds-number", "flow-reynolds-number"
 
 
@@ -61,7 +60,7 @@ def flow_limit(batch: RobotBatch, flow: float) -> Limit:
 
 
 def _limit(length: str, value: PerRobot, flag: str) -> Limit:
-    return Limit.of(f"Reynolds number ({length})", value, "at most", LOW_REYNOLDS, "1", _INERTIA, flag)
+    return Limit.named("stokes-flow", value, LOW_REYNOLDS, length=length, flag=flag)
 
 
 def _largest(values: Samples) -> float:

@@ -100,55 +100,33 @@ def local_coefficients(batch: RobotBatch) -> LocalCoefficients:
 
 
 def coefficient_domain(batch: RobotBatch) -> list[Limit]:
-    """Where a set makes sense: 0 < c_t < c_n, else a wire would slip more easily across than along."""
-    return _domain_of_the_set(batch) + _domain_of_the_factors(batch)
+    """Where a set makes sense: 0 < c_t < c_n, else a wire would slip more easily across than along.
 
-
-def _domain_of_the_factors(batch: RobotBatch) -> list[Limit]:
-    """Fitted factors may not turn the order of both coefficients around."""
-    options = batch.options.rft
+    Fitted factors may not turn the order of both coefficients around.
+    """
+    limits, options = _domain_of_the_set(batch), batch.options.rft
     if options.normal_factor == 1.0 and options.tangential_factor == 1.0:
-        return []
+        return limits
     c = local_coefficients(batch)
     across = c.normal if c.floor_normal is None else np.minimum(c.normal, c.floor_normal)
-    why = "with these factors c_t exceeds c_n, which reverses the thrust"
     most = options.tangential_factor * across / c.tangential
-    value = np.full(1, options.tangential_factor)
-    return [Limit.of("model.rft.tangential_factor", value, "less than", most, "1", why, "factors-reverse-thrust")]
+    return [*limits, Limit.named("coefficient-factors", np.full(1, options.tangential_factor), most)]
 
 
 def _domain_of_the_set(batch: RobotBatch) -> list[Limit]:
-    chosen = batch.options.rft.coefficients
-    diameter = batch.wire_diameter
+    chosen, diameter = batch.options.rft.coefficients, batch.wire_diameter
     if chosen == "brennen-winet":
         height = axis_height(batch)
         return [
-            Limit.of(
-                "model.rft.axis_height",
-                height,
-                "more than",
-                batch.amplitude + 0.5 * diameter,
-                "mm",
-                "the wire may not touch the floor",
-                "wire-touches-floor",
-            ),
-            Limit.of(
-                "model.rft.axis_height",
-                height,
-                "more than",
-                math.e * diameter / 4.0,
-                "mm",
-                "log(2 h/a) has to exceed 1",
-                "wire-too-close-to-floor",
-            ),
+            Limit.named("wire-off-floor", height, batch.amplitude + 0.5 * diameter),
+            Limit.named("floor-logarithm", height, math.e * diameter / 4.0),
         ]
     least = {
         "printed": np.exp(1.5) * diameter,
         "gray-hancock": np.exp(1.5) / 4.0 * diameter,
         "lighthill": np.exp(0.5) / 0.36 * diameter * batch.arc_fraction,
     }[chosen]
-    why = f"the '{chosen}' coefficients give c_t > c_n for a wire so thick (tail.wire_diameter), reversing the thrust"
-    return [Limit.of("tail.wavelength", batch.wavelength, "more than", least, "mm", why, "wire-too-thick-for-rft")]
+    return [Limit.named("coefficients", batch.wavelength, least, chosen=chosen)]
 
 
 _PANELS_PER_TURN = 7
@@ -341,17 +319,7 @@ class Rft(SwimmerModel):
         """A wire thin against its wave; with a floor, closer to it than the tail is long."""
         cautions = thin_wire_cautions(batch, 2.6)
         if batch.options.rft.coefficients == "brennen-winet":
-            cautions.append(
-                Limit.of(
-                    "model.rft.axis_height",
-                    axis_height(batch),
-                    "less than",
-                    batch.tail_length,
-                    "mm",
-                    "the near-floor coefficients hold for h well below the tail's length",
-                    "floor-too-far",
-                )
-            )
+            cautions.append(Limit.named("floor-near-tail", axis_height(batch), batch.tail_length))
         return cautions
 
     def placement_of(self, batch: RobotBatch) -> dict[str, Any]:

@@ -170,17 +170,6 @@ def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
     return scale * f.torque, -batch.hand * scale * b * mixed, rotation
 
 
-def _one_helix(batch: RobotBatch) -> list[Limit]:
-    """Lighthill's theorem is averaged along one helix of one size."""
-    why = "slender-body theory (1)-(7) averages along one helix; models rft, slender and tube compute other tails"
-    varied = np.full(1, 0.0 if batch.form.is_helix else np.inf)
-    single = "the tail is no helix of one size: tail.wavelength and a tail.amplitude that are numbers"
-    return [
-        Limit.of("tail.starts", np.full(1, float(batch.form.starts)), "at most", 1.0, "1", why, "several-starts"),
-        Limit.of(single, varied, "at most", 1.0, "1", why, "no-plain-helix"),
-    ]
-
-
 class Sbt(SwimmerModel):
     """Lighthill's slender-body theory for the tail, Perrin's spheroid for the body; axial entries only."""
 
@@ -205,22 +194,16 @@ class Sbt(SwimmerModel):
         """Alpha within the expansion; chi, q and psi positive, so that the block is positive definite."""
         with np.errstate(divide="ignore", invalid="ignore"):
             f = helix_functions(batch)
-        limits = [
-            *([] if batch.form.is_plain else _one_helix(batch)),
-            Limit.of(
-                "tail.amplitude",
-                batch.amplitude,
-                "at most",
-                batch.wavelength * np.sqrt(ALPHA_MIN**-2 - 1.0) / (2.0 * np.pi),
-                "mm",
-                f"slender-body theory is tabulated for alpha from {ALPHA_MIN:g} to 1",
-                "coil-too-tight",
-            ),
-        ]
+        limits = []
+        if not batch.form.is_plain:
+            varied = np.full(1, 0.0 if batch.form.is_helix else np.inf)
+            starts = np.full(1, float(batch.form.starts))
+            limits = [Limit.named("one-start", starts, 1.0), Limit.named("one-helix", varied, 1.0)]
+        widest = batch.wavelength * np.sqrt(ALPHA_MIN**-2 - 1.0) / (2.0 * np.pi)
+        limits.append(Limit.named("tabulated-alpha", batch.amplitude, widest, least=ALPHA_MIN))
         inside = limits[-1].holds
-        why = "the wire (tail.wire_diameter) is too thick, or the helix too short, for slender-body theory"
         for name, value in (("1/chi", f.torque), ("q", f.q), ("Psi", f.Psi), ("psi", f.psi)):
-            limit = Limit.of(f"{name} of eqs (1)-(7)", value, "more than", 0.0, "1", why, "outside-slender-body-theory")
+            limit = Limit.named("helix-function", value, 0.0, name=name)
             limits.append(replace(limit, holds=limit.holds | ~inside))
         return limits
 

@@ -25,22 +25,6 @@ def cutoff(batch: RobotBatch, constant: float) -> PerRobot:
 def thin_wire_cautions(batch: RobotBatch, constant: float) -> list[Limit]:
     """Where what the theories neglect, of order eps^2, exceeds some 4 %, or the helix has no full turn."""
     return [
-        Limit.of(
-            "eps (tail.wire_diameter against tail.wavelength)",
-            cutoff(batch, constant),
-            "at most",
-            _LARGEST_EPS,
-            "1",
-            "the wire is too thick for a thin-wire theory, which neglects terms of order eps^2",
-            "thick-wire",
-        ),
-        Limit.of(
-            "turns (tail.length/tail.wavelength)",
-            batch.tail_length / batch.wavelength,
-            "at least",
-            _FEWEST_TURNS,
-            "1",
-            "the theory averages over whole turns",
-            "short-tail",
-        ),
+        Limit.named("thin-wire", cutoff(batch, constant), _LARGEST_EPS),
+        Limit.named("whole-turns", batch.tail_length / batch.wavelength, _FEWEST_TURNS),
     ]

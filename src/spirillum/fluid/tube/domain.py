@@ -93,8 +93,6 @@ def pose_limits(
     No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine for
     the memory. The least gap is over the body's diameter, the least film at the wire over the wire's radius.
     """
-    fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
-    through = f"the tail would pass through the wall ({fields})"
     resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
     angles = {"pitch": batch.placement.pitch, "yaw": batch.placement.yaw}
@@ -102,74 +100,19 @@ def pose_limits(
     turned = f" ({', '.join(said)})" if said else ""
     share = batch.pose.eccentricity
     gap = "placement.gap" if share is None else f"placement.eccentricity = {share:g}: gap"
-    open_ended = batch.placement.ends == "open"
-    thinnest = thinnest_gap * batch.body_diameter
+    length = batch.channel_length if batch.placement.ends == "open" else np.zeros(1)
+    thinnest, wire = thinnest_gap * batch.body_diameter, wire_film * 0.5 * batch.wire_diameter
+    asked = np.where(np.isinf(films.asked), 0.0, films.asked)
     return [
         *kept,
-        Limit.of(
-            "there is no [channel]: channel.diameter",
-            batch.channel_diameter,
-            "at most",
-            _WIDEST,
-            "mm",
-            "model 'tube' computes the walls of a channel",
-            "no-channel",
-        ),
-        Limit.of(
-            "the [channel] has no length: channel.length",
-            batch.channel_length if open_ended else np.zeros(1),
-            "at most",
-            _WIDEST,
-            "mm",
-            "open ends matter by the length of tube between them (placement.ends = 'closed' needs none)",
-            "no-channel-length",
-        ),
-        Limit.of(
-            "channel.diameter",
-            batch.channel_diameter,
-            "at least",
-            _TIGHTEST * batch.body_diameter,
-            "mm",
-            "an annular gap is resolved down to a twentieth of the body's radius",
-            "gap-too-thin",
-        ),
-        Limit.of(
-            f"largest gap of the body{turned}",
-            films.largest,
-            "more than",
-            0.0,
-            "mm",
-            "else it cuts into the wall; a smaller placement.pitch or placement.yaw leaves more room",
-            "gap-too-wide",
-        ),
-        Limit.of(gap, films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"),
-        Limit.of(
-            gap,
-            np.where(np.isinf(films.asked), 0.0, films.asked),
-            "at most",
-            films.largest,
-            "mm",
-            f"there is no more room in the channel{turned}",
-            "gap-too-wide",
-        ),
-        Limit.of(
-            "clearance of coupling and wall",
-            films.coupling,
-            "at least",
-            thinnest,
-            "mm",
-            "the coupling would touch the wall (placement.pitch, placement.yaw, coupling.diameter)",
-            "tail-in-wall",
-        ),
-        Limit.of(
-            f"clearance of tail and wall{films.where}",
-            films.tail,
-            "at least",
-            wire_film * 0.5 * batch.wire_diameter,
-            "mm",
-            f"{resolved if wire_film else ''}{through}",
-            "tail-in-wall",
-        ),
+        Limit.named("channel", batch.channel_diameter, _WIDEST),
+        Limit.named("open-channel", length, _WIDEST),
+        Limit.named("annulus", batch.channel_diameter, _TIGHTEST * batch.body_diameter),
+        Limit.named("room", films.largest, 0.0, turned=turned),
+        Limit.named("least-gap", films.asked, thinnest, gap=gap),
+        Limit.named("largest-gap", asked, films.largest, gap=gap, turned=turned),
+        Limit.named("coupling-off-wall", films.coupling, thinnest),
+        Limit.named("tail-off-wall", films.tail, wire, where=films.where, resolved=resolved if wire_film else ""),
     ]
 
 

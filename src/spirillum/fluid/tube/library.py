@@ -186,12 +186,10 @@ class TabledTube(Tube):
             table, pose = self.table_of(batch, index), pose_of(batch, index)
             gaps[index], least[index] = pose.clearance(table.geometry.body), least_checked_gap(table.packed)
             yaws[index], most[index] = abs(pose.yaw), largest_yaw(table.packed, pose.offset, pose.pitch)
-        near = f"the table is below it {BELOW}"
-        aside = "the table was checked at such yaws, and there is no error estimate beyond"
         return [
             *super().cautions(batch),
-            Limit.of("gap", gaps, "at least", least, "mm", near, "near-glass"),
-            Limit.of("yaw", yaws, "at most", most, "deg", aside, "beyond-checked-yaw"),
+            Limit.named("checked-gap", gaps, least, below=BELOW),
+            Limit.named("checked-yaw", yaws, most),
         ]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:

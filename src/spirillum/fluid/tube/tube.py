@@ -263,16 +263,9 @@ class Tube(SwimmerModel):
                 waves[index] = _waves(key)
                 if waves[index] <= _MOST_WAVES:
                     memory[index] = _memory(key) / 2**30
-        name, why = (
-            "that gap and tolerance ask for",
-            "a wider placement.gap, a larger model.tube.tolerance or a narrower",
-        )
         gibibytes = "GiB of memory", memory, MOST_MEMORY / 2**30
         asked = (("unknowns", unknowns, _MOST_UNKNOWNS), ("waves", waves, _MOST_WAVES), gibibytes)
-        return limits + [
-            Limit.of(f"{what} {name}", count, "at most", float(most), "1", f"{why} channel needs fewer", "gap-too-thin")
-            for what, count, most in asked
-        ]
+        return limits + [Limit.named("solvable", count, float(most), what=what) for what, count, most in asked]
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`: the average over `model.tube.phases` phases, ends condensed."""

@@ -58,14 +58,13 @@ def _slimness(batch: RobotBatch) -> list[Limit]:
     """Body and coupling neither needles nor foils: their outlines are resolved against their own thickness."""
     solid = batch.coupling_length - 2.0 * batch.coupling_clearance
     coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
-    why = "solids are resolved up to a ratio of length and diameter of a thousand"
     rows = (
         ("body.diameter", batch.body_diameter, _SLIMMEST * batch.body_length),
         ("body.length", batch.body_length, _SLIMMEST * batch.body_diameter),
         ("coupling.diameter", np.where(coupled, batch.coupling_diameter, np.inf), _SLIMMEST * solid),
         ("coupling.length less clearance", np.where(coupled, solid, np.inf), _SLIMMEST * batch.coupling_diameter),
     )
-    return [Limit.of(name, value, "at least", bound, "mm", why, "solid-too-slim") for name, value, bound in rows]
+    return [Limit.named("solid-thickness", value, bound, name=name) for name, value, bound in rows]
 
 
 @lru_cache(maxsize=4096)
@@ -145,62 +144,20 @@ class Slender(SwimmerModel):
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
         behind = batch.coupling_length if batch.shape != "none" else np.full(1, np.inf)
         wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
+        clearance = np.where(coupled & (batch.shape != "none"), batch.coupling_clearance, np.inf)
+        stations = batch.form.starts * station_count(wire_length, 0.5 * batch.wire_diameter)
         limits = [
-            Limit.of(
-                "coupling.length",
-                behind,
-                "more than",
-                0.5 * batch.wire_diameter,
-                "mm",
-                "the tail's root, coupling.length behind the body, would be inside the body",
-                "tail-in-body",
-            ),
-            Limit.of(
-                "coupling.length",
-                behind,
-                "at least",
-                _SMALLEST_GAP * batch.amplitude,
-                "mm",
-                "the gap between body and tail is resolved down to a hundredth of tail.amplitude",
-                "film-too-thin",
-            ),
-            Limit.of(
-                "coupling.clearance",
-                np.where(coupled & (batch.shape != "none"), batch.coupling_clearance, np.inf),
-                "at least",
-                _SMALLEST_CLEARANCE * batch.coupling_diameter,
-                "mm",
-                "the gap between body and coupling is resolved down to a hundredth of coupling.diameter",
-                "film-too-thin",
-            ),
-            Limit.of(
-                "tail.wire_diameter",
-                batch.wire_diameter,
-                "at most",
-                0.5 * batch.arc_length,
-                "mm",
-                "a wire is at least twice as long as it is thick",
-                "wire-too-short",
-            ),
-            Limit.of(
-                "stations along the tail (tail.wire_diameter)",
-                batch.form.starts * station_count(wire_length, 0.5 * batch.wire_diameter),
-                "at most",
-                float(MOST_STATIONS[resolution.wire]),
-                "1",
-                "their equations would fill the memory",
-                "wire-too-thin",
-            ),
+            Limit.named("root-off-body", behind, 0.5 * batch.wire_diameter),
+            Limit.named("tail-off-body", behind, _SMALLEST_GAP * batch.amplitude),
+            Limit.named("coupling-off-body", clearance, _SMALLEST_CLEARANCE * batch.coupling_diameter),
+            Limit.named("wire-length", batch.wire_diameter, 0.5 * batch.arc_length),
+            Limit.named("stations", stations, float(MOST_STATIONS[resolution.wire])),
             *_slimness(batch),
         ]
         nearest = np.full(batch.size, np.inf)
         for index in within(batch, limits):
             nearest[index] = _closest(RobotGeometry.of(batch, index))
-        why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
-        return [
-            *limits,
-            Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch"),
-        ]
+        return [*limits, Limit.named("wire-off-itself", batch.wire_diameter, nearest)]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
@@ -210,24 +167,8 @@ class Slender(SwimmerModel):
         """A wire thin against its wave, its turns apart, and long enough for its ends not to matter much."""
         return [
             thin_wire_cautions(batch, EXACT_EPS_CONSTANT)[0],
-            Limit.of(
-                "tail.wire_diameter",
-                batch.wire_diameter,
-                "at most",
-                coil_spacing(batch.wavelength, batch.amplitude) / 3.0,
-                "mm",
-                "turns of the coil closer than two wire diameters to each other are resolved to some 5 % only",
-                "close-turns",
-            ),
-            Limit.of(
-                "tail.wire_diameter",
-                batch.wire_diameter,
-                "at most",
-                0.2 * batch.arc_length,
-                "mm",
-                "the ends of a wire shorter than five diameters are resolved to some 5 % only",
-                "short-wire",
-            ),
+            Limit.named("turns-apart", batch.wire_diameter, coil_spacing(batch.wavelength, batch.amplitude) / 3.0),
+            Limit.named("wire-ends", batch.wire_diameter, 0.2 * batch.arc_length),
         ]
 
     def axial(self, batch: RobotBatch) -> Axial:
