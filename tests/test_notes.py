@@ -2,6 +2,7 @@
 
 import ast
 import pickle
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
+from spirillum.data_tables import rows_of
 from spirillum.notes import KINDS, LONGEST, TRACKING, Note, note_attributes, notes_in, shown_cautions
 
 ROOT = Path(__file__).parent.parent
@@ -33,7 +35,7 @@ def literals(name: str) -> Iterator[tuple[str, str]]:
 
 
 def test_every_code_is_explained_and_every_explained_code_is_used() -> None:
-    used = {code for code, _ in literals("Note")}
+    used = {code for code, _ in literals("Note")} | {row["code"] for row in rows_of("sentences.csv")}
     assert used <= set(KINDS)
     own = set(KINDS) - set(TRACKING)
     computed = {"inertia", "outside-validity", "remark", "misfit", "intervals-incomplete"}
@@ -43,6 +45,15 @@ def test_every_code_is_explained_and_every_explained_code_is_used() -> None:
 
 def test_sentences_are_short() -> None:
     assert [sentence for _, sentence in literals("Note") if len(sentence) > LONGEST] == []
+    texts = [re.sub(r"\{.*?\}", "", row["sentence"]) for row in rows_of("sentences.csv")]
+    assert [text for text in texts if len(text) > LONGEST] == []
+
+
+def test_every_sentence_of_the_table_is_raised() -> None:
+    names = {row["name"] for row in rows_of("sentences.csv")}
+    source = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    chosen = {name for name in names if f'"{name}"' in source}
+    assert set(re.findall(r'Note\.named\(\s*"([\w-]+)"', source)) <= names == chosen
 
 
 def test_every_code_has_an_anchor_in_the_documentation() -> None:

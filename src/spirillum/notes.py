@@ -1,7 +1,8 @@
 """Notes of an answer: what is assumed or violated, its effect on the result, and what to do, each with a code.
 
 A note is its sentence, so that it can be printed, compared and counted as text; its code, severity and fields are for
-programs. The code's longer explanation is in `notes.csv` and, written from there, in `docs/notes.md`.
+programs. The code's longer explanation is in `notes.csv` and, written from there, in `docs/notes.md`; sentences with
+places for numbers stand in `sentences.csv`.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ KINDS: dict[str, NoteKind] = {
     **{code: NoteKind("info", words) for code, words in _EXPLAINED["info"].items()},
 }
 """Kinds of notes by code; cautions in the order in which a terminal shows them."""
+_SENTENCES = {row["name"]: row for row in rows_of("sentences.csv")}
+"""Code, fields and sentence of notes by their names, with places for words and numbers."""
 _FALLBACK = "remark"
 _RATES = ("-forward-velocity", "-body-rotation-rate", "-tail-rotation-rate")
 
@@ -63,6 +66,13 @@ class Note(str):
         note = super().__new__(cls, sentence)
         note.code, note.fields = _known(code), tuple(fields)
         return note
+
+    @classmethod
+    def named(cls, name: str, /, **values: Any) -> Note:
+        """The note of `sentences.csv` under a name, with values in its sentence and fields."""
+        row = _SENTENCES[name]
+        fields = row["fields"].format(**values).split()
+        return cls(row["code"], row["sentence"].format(**values), fields)
 
     def __getnewargs__(self) -> tuple[str, str, tuple[str, ...]]:  # type: ignore[override]
         """Arguments with which another process recreates it."""

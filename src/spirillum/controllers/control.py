@@ -302,13 +302,7 @@ def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[Note]]:
     if model == "tube" or not lab.pulse.velocity:
         return lab, []
     still = lab.pulse.model_copy(update={"velocity": 0.0})
-    return lab.model_copy(update={"pulse": still}), [
-        Note(
-            "input-unused",
-            f"model '{model}' has no flow: the pulse of flow is left out; use model tube",
-            ("lab.pulse",),
-        )
-    ]
+    return lab.model_copy(update={"pulse": still}), [Note.named("pulse-left-out", model=model)]
 
 
 def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[Note]]:
@@ -322,11 +316,8 @@ def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None
                 progress("scored runs", len(outcomes), len(jobs))
     except KeyboardInterrupt:
         pass
-    complete = len(outcomes) == len(jobs)
-    note = Note(
-        "run-cut-short", f"interrupted after {len(outcomes)} of {len(jobs)} runs: scores are of these", ("seeds",)
-    )
-    return scored(job.task, outcomes) if outcomes else None, [] if complete else [note]
+    cut_short = [Note.named("scores-cut-short", done=len(outcomes), all=len(jobs))]
+    return scored(job.task, outcomes) if outcomes else None, cut_short if len(outcomes) < len(jobs) else []
 
 
 def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
@@ -367,17 +358,11 @@ def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:
     warnings = []
     end, latency = run.moments[-1].time, lab.camera.latency
     if latency >= end:
-        words = (
-            f"no picture reached the controller: camera.latency = {show(latency, 's')}, and the run lasted "
-            f"{show(end, 's')}; use a longer run"
-        )
-        warnings.append(Note("run-cut-short", words, ("camera.latency",)))
+        warnings.append(Note.named("no-picture-in-time", latency=show(latency, "s"), end=show(end, "s")))
     if run.silent is not None:
-        words = f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}"
-        warnings.append(Note("run-cut-short", words, ("camera",)))
+        warnings.append(Note.named("camera-silent", time=show(run.silent, "s")))
     if run.ended:
-        words = f"the run ended at {show(run.moments[-1].time, 's')}: {run.ended}; the drive is off"
-        warnings.append(Note("run-cut-short", words, ("duration",)))
+        warnings.append(Note.named("control-ended", time=show(end, "s"), why=run.ended))
     return warnings
 
 

@@ -214,29 +214,22 @@ class ModelComparison(DisplayMixin):
 
 def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Sequence[str]) -> list[Note]:
     """What sets models apart besides their theory, a sentence each."""
-    found = []
     walled = [name for name in models if find_swimmer_model(name).placed]
     open_ = [name for name in models if name not in walled]
-    if walled and open_ and any(robot.channel is not None for robot in robots):
-        words = (
-            f"wall effects are modelled by {', '.join(walled)} and not by {', '.join(open_)}: differences include them"
-        )
-        found.append(Note("models-differ", words, ("channel",)))
     bare = [name for name in open_ if name not in calibrated]
-    if calibrated and bare:
-        words = (
-            f"drag factors are fitted for {', '.join(calibrated)} and not for {', '.join(bare)}: differences include "
-            "them; use --no-calibration"
-        )
-        found.append(Note("models-differ", words, ("calibration",)))
     turned = [name for name in models if "coupling" in find_swimmer_model(name).parts]
     without = [name for name in models if name not in turned]
-    if turned and without and any(robot.coupling.length > 0 and robot.coupling.diameter > 0 for robot in robots):
-        words = (
-            f"the coupling is modelled by {', '.join(turned)} and not by {', '.join(without)}: torques differ by it too"
+    in_channel = any(robot.channel is not None for robot in robots)
+    coupled = any(robot.coupling.length > 0 and robot.coupling.diameter > 0 for robot in robots)
+    return [
+        Note.named(name, some=", ".join(some), others=", ".join(others))
+        for name, some, others, matters in (
+            ("walls-in-some-models", walled, open_, in_channel),
+            ("factors-of-some-models", calibrated, bare, True),
+            ("coupling-in-some-models", turned, without, coupled),
         )
-        found.append(Note("models-differ", words, ("coupling",)))
-    return found
+        if some and others and matters
+    ]
 
 
 def estimated_error(prediction: Prediction) -> float | None:

@@ -57,22 +57,16 @@ def chosen_run(
     notes: list[Note] = []
     if not choice.fitted:
         if fit.models and choice.model not in fit.models:
-            words = (
-                f"{fit.name} was fitted with model '{fit.models[0]}', and the run uses '{choice.model}', on which its "
-                f"factors do not act; use --model {fit.models[0]}"
-            )
-            notes.append(Note("fit-not-used", words, ("model",)))
+            notes.append(Note.named("fit-of-another-model", fit=fit.name, fitted=fit.models[0], model=choice.model))
         return choice, motion or "free", notes
-    notes.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
+    notes.append(Note.named("model-of-run", model=choice.model, reason=choice.reason))
     chosen = find_swimmer_model(choice.model)
     if motion is None and chosen.placed and fit.friction_coefficient:
-        words = "dry friction is fitted and acts on a free robot: the run is a free motion"
-        notes.append(Note("model-chosen", words, ("motion",)))
+        notes.append(Note.named("free-by-friction"))
         motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed) and not fit.of_trials:
         why = "has the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one pose"
-        words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
-        notes.append(Note("model-chosen", words, ("motion",)))
+        notes.append(Note.named("axial-run", model=choice.model, why=why))
         return choice, "held", notes
     if motion != "held" and chosen.placed and fit.posterior is None and not fit.of_trials:
         notes.append(CALIBRATED_HELD)
@@ -113,10 +107,7 @@ def with_intervals(
             scalars |= _limits(name, np.array(found[name]) * factor, dataset)
     notes = notes_in(dataset.attrs)
     if len(drawn) < _SURE:
-        words = (
-            f"draws = {len(drawn)}: a 95 % interval from so few varies from one set to the next; use {_SURE} or more"
-        )
-        notes = (*notes, Note("intervals-incomplete", words, ("draws",)))
+        notes = (*notes, Note.named("few-draws", draws=len(drawn), enough=_SURE))
     return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL, **note_attributes(notes))
 
 

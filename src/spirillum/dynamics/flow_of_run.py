@@ -120,8 +120,8 @@ def moment_of_run(
     now = _sample(dataset, int(np.argmin(np.abs(times - moment))))
     nearest = float(now["time"])
     if abs(nearest - moment) > _SAME_TIME * float(np.min(np.diff(times), initial=np.inf)):
-        words = f"the run has no sample at {moment:.7g} s: the flow is that at the nearest one, {nearest:.7g} s"
-        now = now.assign_attrs(note_attributes([Note("drawn-otherwise", words, ("time",)), *notes_in(now.attrs)]))
+        note = Note.named("nearest-sample", time=moment, nearest=nearest)
+        now = now.assign_attrs(note_attributes([note, *notes_in(now.attrs)]))
     return _motion(now, resolution)
 
 
@@ -169,11 +169,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         check_domain(robot, Tube(), batch)
     notes = list(notes_in(now.attrs))
     if gap < drawn:
-        words = (
-            f"the lubrication film of {show(gap, 'um')} is too thin to resolve: the robot is shown "
-            f"{show(drawn - gap, 'um')} further off the wall; ignore film pressure and force"
-        )
-        notes.append(Note("drawn-otherwise", words, ("wall_gap", "held_force")))
+        notes.append(Note.named("lifted-off-film", film=show(gap, "um"), lift=show(drawn - gap, "um")))
     nothing = {item.name: np.array([np.nan]) for item in STEADY}
     known = {
         "forward_velocity": float(now["velocity"].values[0]),

@@ -212,11 +212,7 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
         found.append(NO_WEIGHT)
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > _FEW_TURNS * run.turn.time:
-        words = (
-            f"the steady motion is approached with a time constant of {slow:.3g} s, which a trial of some turns does "
-            "not reach; `simulate` follows it"
-        )
-        found.append(Note("unsteady", words, ("duration",)))
+        found.append(Note.named("slow-approach", time=slow))
     return found
 
 

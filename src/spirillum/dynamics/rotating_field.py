@@ -235,7 +235,17 @@ def magnetic_sweep(
         found.append(mean)
         settled.append(still)
         inertia |= _check_stokes(batch, np.array([rate]), np.array([mean.velocity]), np.array([mean.rate]))
-    notes = [*_without_walls(held), *held.robot.warnings, *inertia.values()]
+    notes = [] if held.robot.channel is None else [Note.named("sweep-without-walls", model=held.model.name)]
+    notes += [*held.robot.warnings, *inertia.values()]
+    if not all(settled):
+        open_ = np.abs(requested[~np.array(settled)])
+        least, most = (show(float(rate), "Hz") for rate in (open_.min(), open_.max()))
+        notes.append(
+            Note.named(
+                "sweep-still-changes", count=open_.size, rates=requested.size, least=least, most=most,
+                stretches=_MOST_STRETCHES, turns=turns,
+            )
+        )  # fmt: skip
     return _dataset(held, closed, requested, found, np.array(settled, dtype=float), turns, notes)
 
 
@@ -351,28 +361,6 @@ def _pushed(attitude: Samples) -> Samples:
     return np.asarray((push * Rotation.from_quat(attitude, scalar_first=True)).as_quat(scalar_first=True))
 
 
-def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[Note]:
-    """A sentence on the rates at which the motion still changes."""
-    if np.all(settled):
-        return []
-    open_ = np.abs(rates[settled == 0])
-    words = (
-        f"at {open_.size} of {rates.size} rates ({show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}) "
-        f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns; use more turns"
-    )
-    return [Note("unsteady", words, ("forward_velocity", "wobble_angle"))]
-
-
-def _without_walls(held: Prediction) -> list[Note]:
-    """A sentence on the walls of a robot's channel, which a sweep leaves out; none without a channel."""
-    if held.robot.channel is None:
-        return []
-    words = (
-        f"wall effects are not modelled by '{held.model.name}': speed and step-out rate are too high; predict with tube"
-    )
-    return [Note("walls-left-out", words, ("model", "channel"))]
-
-
 def _dataset(
     held: Prediction,
     closed: Swimming,
@@ -417,7 +405,7 @@ def _dataset(
             "known_error": held.known_error,
             "integrator": TwoLinks.integrator(),
             "references": " ".join(held.references),
-            **note_attributes([*notes, *_unsettled(rates, settled, turns)]),
+            **note_attributes(notes),
             "versions": versions(),
         },
     )

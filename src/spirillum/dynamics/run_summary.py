@@ -263,11 +263,8 @@ def vertical_drift(run: xr.Dataset) -> list[Note]:
         return []
     upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
     pitch = float(np.degrees(late["pitch"].values[-1]))
-    words = (
-        f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the "
-        f"run, pitched by {pitch:.3g} deg at the end: velocities are those along x"
-    )
-    return [Note("velocity-along-x", words, ("mean_forward_velocity",))]
+    moves = "sinks" if upwards < 0 else "rises"
+    return [Note.named("vertical-drift", moves=moves, speed=1e3 * abs(upwards), pitch=pitch)]
 
 
 def end_state(run: xr.Dataset, notes: Iterable[Note], slow: float) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 
 from spirillum.dynamics.axial_robot import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
-from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
@@ -188,11 +187,7 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
     way = late["position"].values[-1] - late["position"].values[0]
     axis = TurningField(rotation_rate=0.0, strength=0.0, yaw=yaw, pitch=pitch).axis
     speed = 1e3 * float(way @ axis) / float(late["time"][-1] - late["time"][0])
-    words = (
-        f"the field's axis is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg): velocities "
-        f"are those along x; along that axis it swims at {speed:.4g} mm/s"
-    )
-    return [Note("velocity-along-x", words, ("field.yaw", "field.pitch"))]
+    return [Note.named("along-tilted-axis", yaw=np.degrees(yaw), pitch=np.degrees(pitch), speed=speed)]
 
 
 def _table(
@@ -227,7 +222,8 @@ def _free_run(
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
-    notes = [*steady.warnings, *_left_out(steady, links, weight=weight), *unused]
+    notes = [*steady.warnings, *([Note.named("film-alone")] if steady.robot.channel is not None else [])]
+    notes += [*([NO_WEIGHT] if weight and not links.weight.any() else []), *unused]
     more = {}
     if links.is_walled:
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.roughness
@@ -270,16 +266,3 @@ def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *
     if given:
         or_walls = ", or model 'tube'" if placement.is_given else ""
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'{or_walls}")
-
-
-def _left_out(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[Note]:
-    """What this form of a free motion leaves out, a sentence each."""
-    found = []
-    if steady.robot.channel is not None:
-        words = (
-            "wall effects are not modelled beyond the film at the nearest wall: the speed is too high; use model tube"
-        )
-        found.append(Note("walls-left-out", words, ("model", "channel")))
-    if weight and not links.weight.any():
-        found.append(NO_WEIGHT)
-    return found

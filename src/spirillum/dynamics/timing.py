@@ -220,12 +220,10 @@ class Timing(Options):
         """Parts of the schedule beyond the end of the run, a sentence each."""
         notes = []
         if all(switch.duty == 0 for switch in switches):
-            words = f"the remote switches nothing on before the run ends at {end:.4g} s"
-            notes.append(Note("schedule-outside-run", words, ("on",)))
+            notes.append(Note.named("nothing-switched-on", end=end))
         late = [(start, stop) for start, stop in self.on or () if start >= end]
         if late:
             first, last = late[0]
             also = f" and {len(late) - 1} more" if len(late) > 1 else ""
-            words = f"on = {first:g} s to {last:g} s{also} lies beyond the end of the run at {end:.4g} s"
-            notes.append(Note("schedule-outside-run", words, ("on",)))
+            notes.append(Note.named("on-beyond-end", first=first, last=last, also=also, end=end))
         return notes

@@ -86,8 +86,7 @@ def tube_run(
     ended = float(run.time[-1])
     notes = [*steady.warnings]
     if ended < times.end:
-        words = f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}"
-        notes.append(Note("run-cut-short", words, ("duration",)))
+        notes.append(Note.named("run-ended-early", ended=ended, end=times.end, what=run.events[-1].what))
     notes += times.notes
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
     attrs = free_attributes(steady, robot, run, reach, title, notes)

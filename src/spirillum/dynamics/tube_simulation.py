@@ -210,14 +210,10 @@ def links_in_tube(
 def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
     """A sentence on a flow file of several rows whose times are not those of the run; none for any other."""
     first, last = float(flow[0, 0]), float(flow[-1, 0])
-    if len(flow) == 1:
-        return []
-    if first >= end:
-        words = f"{source} begins at {first:g} s, and the run ends at {end:.4g} s: the flow is that of its first row"
-        return [Note("schedule-outside-run", words, ("in_tube.flow",))]
-    if last < end * (1.0 - 1e-9):
-        words = f"{source} ends at {last:g} s, and the run at {end:.4g} s: from then on the flow is its last row's"
-        return [Note("schedule-outside-run", words, ("in_tube.flow",))]
+    if len(flow) > 1 and first >= end:
+        return [Note.named("flow-begins-late", source=source, first=first, end=end)]
+    if len(flow) > 1 and last < end * (1.0 - 1e-9):
+        return [Note.named("flow-ends-early", source=source, last=last, end=end)]
     return []
 
 
@@ -305,24 +301,17 @@ def compare_with_check(
     if outside.any():
         beyond = np.flatnonzero(outside)
         up, aside = (np.degrees(np.abs(angle[beyond]).max()) for angle in (pitch, yaw))
-        words = (
-            f"{_from(time, beyond[0])}it tilts beyond its table (pitch {up:.3g} deg, yaw {aside:.3g} deg): the "
-            "resistance is that of the nearest pose inside, without error estimate"
-        )
-        notes.append(Note("table-not-checked", words, ("wall_pitch", "wall_yaw", "error_estimate")))
+        notes.append(Note.named("beyond-table", since=_from(time, beyond[0]), pitch=up, yaw=aside))
     elif beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
-        words = (
-            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "
-            f"checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
-        )
-        notes.append(Note("table-not-checked", words, ("wall_yaw", "error_estimate")))
+        reached, known = np.degrees(np.abs(yaw[most])), np.degrees(checked[most])
+        notes.append(Note.named("beyond-checked-yaw", since=_from(time, beyond[0]), yaw=reached, checked=known))
     least = least_checked_gap(table)
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
-        falls = f"{_falls(time, int(near[0]))} {_length(float(gap[near].min()))}"
-        words = f"{falls}: below {_length(least)} its table is {BELOW}"
-        notes.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
+        falls = "its least gap within a turn is" if time is None else f"{_from(time, near[0])}its gap falls to"
+        falls = f"{falls} {_length(float(gap[near].min()))}"
+        notes.append(Note.named("below-checked-gap", gap=falls, least=_length(least), below=BELOW))
     return Checked(not beyond.size, bool(near.size), notes)
 
 
@@ -331,15 +320,8 @@ def sticking_notes(robot: TubeRobot, *, forward: float, turning: float, contact_
     smoothed = float(robot.tube[kernel.SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
         return []
-    words = (
-        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: it slides below "
-        f"{show(smoothed, 'um/s')}, where the friction law is smoothed, and has no error estimate"
-    )
-    return [Note("held-by-friction", words, ("in_tube.friction_coefficient", "forward_velocity"))]
-
-
-def _falls(time: Samples | None, first: int) -> str:
-    return "its least gap within a turn is" if time is None else f"{_from(time, first)}its gap falls to"
+    coefficient = float(robot.tube[kernel.COEFFICIENT])
+    return [Note.named("held-by-friction", coefficient=coefficient, speed=show(smoothed, "um/s"))]
 
 
 def _from(time: Samples | None, first: int) -> str:

@@ -87,8 +87,7 @@ def _resistance(robot: Robot, model: str) -> _Resistance:
     matrix = chosen.resistance(batch, np.zeros(1))[0]
     warnings = [limit.caution() for limit in broken(chosen.cautions(batch))]
     if robot.coupling.length > 0 and "coupling" not in chosen.parts:
-        words = f"model '{model}' has no coupling: its drag is missing; use another of {', '.join(FULL_MODELS)}"
-        warnings.append(Note("coupling-left-out", words, ("coupling",)))
+        warnings.append(Note.named("links-without-coupling", model=model, models=", ".join(FULL_MODELS)))
     return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
 
 
@@ -142,11 +141,6 @@ def urdf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: floa
     )
 
 
-FLUID_WARNING = Note(
-    "physics-engine-fluid",
-    "MuJoCo's own fluid gives a helix no thrust and must stay off; apply the forces of the resistance matrix at "
-    "each step",
-)
 _LEAST = 1e-15  # MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers
 _MOST_TRIANGLES = 200_000
 _STEP = 1e-4

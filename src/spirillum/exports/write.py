@@ -16,7 +16,7 @@ from spirillum.dynamics.axial_robot import axial_robot
 from spirillum.dynamics.plant import Plant
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.errors import InputError, check_choice
-from spirillum.exports.descriptions import FLUID_WARNING, check_inertia, mjcf_text, sidecar_of, urdf_text
+from spirillum.exports.descriptions import check_inertia, mjcf_text, sidecar_of, urdf_text
 from spirillum.exports.meshes import (
     UnitedBody,
     is_watertight,
@@ -176,13 +176,11 @@ def _cautions(robot: Robot, body: UnitedBody, found: Mapping[str, Any]) -> list[
     unit = found["unit"]
     notes = []
     if found["bodies"] != 1:
-        words = f"the STL file holds {found['bodies']} separate bodies; a printer may refuse it"
-        notes.append(Note("mesh-not-closed", words))
+        notes.append(Note.named("separate-bodies", count=found["bodies"]))
     if not found["watertight"]:
         better = next((name for name in STL_UNITS if is_watertight_file(_stl_of(robot, body, name))), None)
         remedy = f"use --unit {better}" if better else "repair it before printing"
-        words = f"the STL file is not watertight in {unit}: vertices closer than 1e-8 {unit} are merged; {remedy}"
-        notes.append(Note("mesh-not-closed", words, ("unit",)))
+        notes.append(Note.named("stl-not-watertight", unit=unit, remedy=remedy))
     return notes
 
 
@@ -333,13 +331,13 @@ def _shape_of(
     _commit(target, {name: content.data for name, content in contents.items()})
     files = tuple(Written(target.parent / name, content.holds) for name, content in contents.items())
     cautions += [
-        Note("mesh-not-closed", f"{name} is not watertight in mm: a program that needs closed bodies may refuse it")
+        Note.named("part-not-watertight", name=name)
         for name, content in contents.items()
         if name.endswith("-solid.stl") and not is_watertight_file(content.data)
     ]
     warnings = [*robot.warnings, *notes_in_answer(beside), *cautions]
     if target.suffix.lower() in (".mjcf", ".xml"):
-        warnings.append(FLUID_WARNING)
+        warnings.append(Note.named("fluid-of-mujoco"))
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))
 
 

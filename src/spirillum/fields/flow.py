@@ -88,8 +88,7 @@ class Flow(DisplayMixin):
         """What to be careful about, a sentence each."""
         if self.robot.channel is None or self.seat is not None:
             return self.prediction.warnings
-        words = "wall effects are not modelled: this is the flow in unbounded fluid; use model tube"
-        return (*self.prediction.warnings, Note("incomplete-flow-field", words, ("channel",)))
+        return (*self.prediction.warnings, Note.named("flow-without-walls"))
 
     def to_dict(self) -> dict[str, Any]:
         """The motion and its settings, as data."""

@@ -155,10 +155,7 @@ def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str
     if part not in ("body", "coupling"):
         found += [limit.caution() for limit in broken(model.cautions(batch))]
     if model.axial_only:
-        words = f"model '{model.name}' gives the entries along and about the motor axis only; the others are unknown"
-        found.append(Note("axial-only", words, ("matrix",)))
+        found.append(Note.named("axial-entries", model=model.name))
     if part in ("rotor", "robot", _BOTH) and robot.coupling.length > 0 and "coupling" not in model.parts:
-        found.append(
-            Note("coupling-left-out", f"model '{model.name}' has no coupling: its drag is missing", ("coupling",))
-        )
+        found.append(Note.named("no-coupling", model=model.name))
     return tuple(found)

@@ -224,11 +224,7 @@ class _Log:
         theirs, ours = frame.time - self._first[0], frame.clock - self._first[1]
         self._clocks = None
         if abs(theirs - ours) > _CLOCK_JITTER + _CLOCK_ERROR * ours and ours > 1.0:
-            words = (
-                f"{self.source.name}: {theirs:.1f} s by the frames' times were {ours:.1f} s by this computer's clock: "
-                "all rates are wrong by that factor; check the frame rate"
-            )
-            self._clocks = Note("clock-in-doubt", words, ("camera.frames_per_second",))
+            self._clocks = Note.named("clocks-differ", source=self.source.name, theirs=theirs, ours=ours)
 
     def _hint(self) -> str:
         """What helps a video that has ended while the robot was still learnt."""

@@ -205,8 +205,8 @@ class Datagrams:
         """A sentence if the network took some of the lines not."""
         if not self._unsent:
             return ()
-        words = f"udp = {self._address}: {self._unsent} of {self._lines} lines could not be sent ({self._reason})"
-        return (Note("lines-not-sent", words, ("udp",)),)
+        counts = {"unsent": self._unsent, "lines": self._lines}
+        return (Note.named("lines-lost", address=self._address, reason=self._reason, **counts),)
 
     def close(self) -> None:
         """No more lines."""

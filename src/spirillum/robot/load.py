@@ -40,9 +40,7 @@ _DENSEST = 22590.0
 """Density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)."""
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
-PAPER_ROBOTS_TAKEN = Note(
-    "model-chosen", f"no robot is named: those of the paper, {' and '.join(PAPER_ROBOTS)}, are used; name your own"
-)
+PAPER_ROBOTS_TAKEN = Note.named("paper-robots", robots=" and ".join(PAPER_ROBOTS))
 """Presets of the paper's robot, one for each of its channels."""
 
 
@@ -306,21 +304,13 @@ def _stale(table: Mapping[str, Any], changes: Sequence[set[str]]) -> Iterator[No
     body = table.get("body")
     newer = _older(changes, "body.mass", _WEIGHED)
     if newer and isinstance(body, dict) and "mass" in body:
-        yield _doubt(
-            f"body.mass = {body['mass']} was measured before {', '.join(newer)} changed; set it anew",
-            "body.mass",
-            *newer,
-        )
+        yield Note.named("mass-before-changes", mass=body["mass"], changed=", ".join(newer), newer=" ".join(newer))
     for field, whose in _SIZED.items():
         section, name = field.split(".")
         newer, held = _older(changes, field, _SIZE), table.get(section)
         if newer and isinstance(held, dict) and held.get(name) is not None:
-            words = f"{field} = {held[name]} is {whose} of another body, before {', '.join(newer)} changed; set it anew"
-            yield _doubt(words, field, *newer)
-
-
-def _doubt(words: str, *fields: str) -> Note:
-    return Note("robot-file-doubtful", words, fields)
+            names = {"changed": ", ".join(newer), "newer": " ".join(newer)}
+            yield Note.named("of-another-size", field=field, value=held[name], whose=whose, **names)
 
 
 def _old_coupling(robot: Robot, changes: Sequence[set[str]]) -> tuple[Note, ...]:
@@ -329,11 +319,8 @@ def _old_coupling(robot: Robot, changes: Sequence[set[str]]) -> tuple[Note, ...]
         own, body = getattr(robot.coupling, name), getattr(robot.body, name)
         last = next((layer for layer in reversed(changes) if {f"coupling.{name}", f"body.{name}"} & layer), set())
         if robot.has_body and own > body and f"body.{name}" in last and f"coupling.{name}" not in last:
-            words = (
-                f"coupling.{name} = {show(own, 'mm')} is that of another body and {beyond} than body.{name} = "
-                f"{show(body, 'mm')}; set it anew"
-            )
-            return (_doubt(words, f"coupling.{name}", f"body.{name}"),)
+            sizes = {"own": show(own, "mm"), "body": show(body, "mm")}
+            return (Note.named("coupling-of-another-body", name=name, beyond=beyond, **sizes),)
     return ()
 
 
@@ -342,31 +329,16 @@ def _doubts(robot: Robot) -> Iterator[Note]:
     derived = robot.derived()  # once: it integrates the solids
     weight = derived.get("submerged_weight")
     if weight is not None and weight.value <= 0:
-        words = (
-            f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on the "
-            "floor; check body.mass"
-        )
-        yield Note("robot-floats", words, ("body.mass", "tail.density", "fluid.density"))
+        yield Note.named("robot-floats", weight=weight.value)
     if robot.body.center_of_mass is not None:
-        words = (
-            "body.center_of_mass acts in released motion only; axial motion leaves its torque out: use motion 'free'"
-        )
-        yield _doubt(words, "body.center_of_mass")
+        yield Note.named("center-of-mass-unused")
     if (mass := robot.body.mass) is not None:
         density = mass / (derived["body_volume"].value + derived["coupling_volume"].value)
         if density > _DENSEST:
-            words = (
-                f"body.mass = {show(mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense; the densest "
-                f"metal has {_DENSEST:.4g}; check its unit"
-            )
-            yield _doubt(words, "body.mass")
+            yield Note.named("dense-body", mass=show(mass, "kg"), density=density, densest=_DENSEST)
     own, whole = None if robot.motor is None else robot.motor.joint_rotor_friction, robot.friction.effective
     if own is not None and whole is not None and whole < own:
-        words = (
-            f"friction.effective = {show(whole, 'N m s/rad')} is less than the rotor's own B_m = "
-            f"{show(own, 'N m s/rad')}, which it contains; check both"
-        )
-        yield _doubt(words, "friction.effective", "motor.rotor_friction")
+        yield Note.named("friction-below-rotor", whole=show(whole, "N m s/rad"), own=show(own, "N m s/rad"))
     yield from smoothing_notes(robot.tail.form)
 
 

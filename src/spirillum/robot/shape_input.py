@@ -243,11 +243,8 @@ def smoothing_notes(form: TailForm) -> tuple[Note, ...]:
     if all(abs(change) <= _SMOOTHED[name] for name, change in changes.items()):
         return ()
     radius, amplitude, length = (f"{100.0 * change:+.2g} %" for change in changes.values())
-    words = (
-        f"tail.curve_tolerance = {show(form.tolerance, 'mm')} changes the curve's mean radius by {radius}, amplitude "
-        f"by {amplitude}, length by {length}: lower it"
-    )
-    return (Note("curve-smoothed", words, ("tail.curve_tolerance", "tail.curve")),)
+    sizes = {"tolerance": show(form.tolerance, "mm"), "radius": radius, "amplitude": amplitude, "length": length}
+    return (Note.named("curve-smoothed", **sizes),)
 
 
 def read_profile(table: dict[str, Any]) -> dict[str, Any]:

@@ -186,7 +186,7 @@ def band_of(
         if not found[-1].valid[0]:
             outside = broken(requirements(there, model))
             why = outside[0].sentence() if outside else "the robot finds no steady motion there"
-            left_out.append(Note("without-answer", f"the band leaves out {where}: {why}"))
+            left_out.append(Note.named("pose-left-out", where=where, why=why))
     tell(model.name, len(places) + 1, len(places) + 1)
     return Band(
         left_open(batch.pose, model),

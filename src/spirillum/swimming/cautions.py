@@ -19,11 +19,7 @@ from spirillum.swimming.reynolds import reynolds_limits
 from spirillum.swimming.steady import Swimming
 from spirillum.units import show
 
-NO_WEIGHT = Note(
-    "no-weight",
-    "body.mass or tail.density is unset: the robot has no weight in the fluid; set both",
-    ("body.mass", "tail.density"),
-)
+NO_WEIGHT = Note.named("no-masses")
 """Caution of a free motion of a robot whose masses are unknown."""
 
 
@@ -56,15 +52,7 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
         return []
     entry = robot.calibration.get(model)
     if entry is None:
-        if robot.channel is None:  # no walls to represent
-            return []
-        return [
-            Note(
-                "calibration-missing",
-                f"wall effects are not modelled: '{model}' has no calibration here, drag factors are 1; use model tube",
-                ("calibration",),
-            )
-        ]
+        return [] if robot.channel is None else [Note.named("not-calibrated", model=model)]  # no walls to represent
     fitted = entry.fitted_to
     channel = robot.channel.diameter if robot.channel else None
     pairs = (
@@ -80,14 +68,8 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
     if not differing:
         return []
     more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
-    return [
-        Note(
-            "calibration-outside",
-            f"calibration.{model} is used outside its geometry, {differing[0]}{more}: factors may not hold; "
-            "recalibrate",
-            [words.partition(" = ")[0] for words in differing],
-        )
-    ]
+    fields = " ".join(words.partition(" = ")[0] for words in differing)
+    return [Note.named("calibrated-elsewhere", model=model, differs=differing[0], more=more, fields=fields)]
 
 
 def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
@@ -95,19 +77,15 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     over = left_open(batch.pose, model)
     if not over:
         return []
-    are = "is" if len(over) == 1 else "are"
+    named = f"{' and '.join(over)} {'is' if len(over) == 1 else 'are'}"
     more = "--band gives the band over them, in minutes"
     if not has_table(batch) and not why_no_table(batch):
         whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
         more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
-    return [Note("pose-unknown", f"{' and '.join(over)} {are} unknown: this answer is for one pose; {more}", over)]
+    return [Note.named("pose-open", open=named, more=more, fields=" ".join(over))]
 
 
-CONSTANT_TORQUE = Note(
-    "constant-torque",
-    "drive.kind = 'torque' assumes the same torque at every rate: speed and rates fall as one over the viscosity",
-    ("drive.kind",),
-)
+CONSTANT_TORQUE = Note.named("constant-torque")
 """What a drive of given torque takes for granted."""
 
 
@@ -118,25 +96,11 @@ def drive_warnings(
     motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
     step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
     if np.isfinite(step_out) and not follows:
-        return [
-            Note(
-                "field-slips",
-                f"the field is faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips, and rates and "
-                "speed are averages; lower the field's rate",
-                ("magnetic.rotation_rate",),
-            )
-        ]
+        return [Note.named("field-slips", rate=show(step_out, "Hz"))]
     factors = robot.calibration.get(model.name)
     found = []
     if reading == "paper" and factors is not None and factors.body_rotation < 1:
-        found.append(
-            Note(
-                "friction-counted-twice",
-                f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already includes friction on the "
-                "body, which 'paper' counts again; use --friction rotor",
-                (f"calibration.{model.name}.body_rotation",),
-            )
-        )
+        found.append(Note.named("friction-twice", model=model.name, factor=factors.body_rotation))
     if rate is None and robot.drive is not None and robot.drive.kind == "torque":
         found.append(CONSTANT_TORQUE)
     if not motor_driven:
@@ -148,41 +112,26 @@ def drive_warnings(
 
 def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note]:
     if reading == "none":
-        words = "friction 'none' leaves out that of the motor: rates and speeds are upper bounds; use 'rotor'"
-        return [Note("friction-unset", words, ("friction.reading",))]
+        return [Note.named("frictionless-motor")]
     if robot.friction.effective is not None or robot.motor is None:
         return []
     name = "B_m" if robot.motor.gear_ratio == 1 else "B_m G^2"
     own = f"{name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
-    words = f"friction.effective is unset: only {own} acts: rates and speeds are upper bounds; set it, or calibrate"
-    if reading == "body":
-        words = f"friction.effective is unset: the body has no wall friction, the joint {own}; set it, or calibrate"
-    return [Note("friction-unset", words, ("friction.effective",))]
+    return [Note.named("no-wall-friction" if reading == "body" else "rotor-friction-alone", own=own)]
 
 
 def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[Note]:
     found = []
     if reading in ("rotor", "paper"):
         if robot.friction.effective is not None:
-            words = "friction.effective is ignored: with a tail rate it is inferred from (17) and (18)"
-            found.append(Note("friction-ignored", words, ("friction.effective",)))
+            found.append(Note.named("friction-inferred"))
         reverse = robot.motor is not None and robot.motor.polarity == "reverse"
         if float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0:
-            words = "the tail turns against its motor: the inferred friction has no meaning; check the rate's sign"
-            found.append(Note("tail-against-motor", words, ("motor.polarity", "tail.handedness", "effective_friction")))
+            found.append(Note.named("against-motor"))
         elif result.effective_friction[0] < 0:
-            words = (
-                "the inferred effective friction is negative: the model's torque exceeds the motor's at this rate; "
-                "check rate and motor"
-            )
-            found.append(Note("friction-negative", words, ("effective_friction",)))
+            found.append(Note.named("friction-negative"))
     else:
-        words = (
-            f"friction '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained; "
-            "use --friction rotor"
-        )
-        found.append(Note("torque-unexplained", words, ("motor_residual_torque",)))
+        found.append(Note.named("torque-left", reading=reading, torque=result.motor_residual_torque[0]))
     if result.electrical_power[0] < 0:
-        words = "the tail drives the motor at this rate: current and electrical power are negative; check the rate"
-        found.append(Note("tail-against-motor", words, ("motor_current", "electrical_power")))
+        found.append(Note.named("motor-driven"))
     return found

@@ -187,30 +187,6 @@ class Prediction(DisplayMixin):
 
 
 _QUANTITIES: dict[str, tuple[str, str]] = {item.name: (item.unit, item.meaning) for item in STEADY}
-_IN_A_FLOW = Note(
-    "imposed-flow",
-    "the imposed flow does work on the robot: efficiencies and cost of transport do not compare with fluid at rest",
-    ("placement.flow", "hydrodynamic_efficiency"),
-)
-_NO_TORQUE = Note(
-    "intervals-incomplete",
-    "torques and B_eff have no intervals: the fitted model has no walls, and no observation states the torque; "
-    "fit tube",
-    ("shaft_torque", "effective_friction"),
-)
-_UNPLACED = {
-    True: Note(
-        "no-weight",
-        "body.mass or tail.density is unset: the robot is assumed to rest on the floor; set both, or its pose (--gap)",
-        ("body.mass", "tail.density"),
-    ),
-    False: Note(
-        "no-weight",
-        "the bare tail is assumed on its channel's axis, where nothing supports its weight; else set --eccentricity",
-        ("placement.eccentricity",),
-    ),
-}
-"""Where a robot is assumed, by whether it has a body."""
 _MORE = {
     "reynolds_number": {"length": "body diameter"},
     "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
@@ -262,7 +238,7 @@ def predict(
             placement=scenario.placement,
         )
         if not knows_torque(ready, chosen):
-            intervals, torque = without_torque(intervals), [_NO_TORQUE]
+            intervals, torque = without_torque(intervals), [Note.named("torque-not-fitted")]
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         direct, tilted = chosen.form == "direct", bool(batch.placement.pitch or batch.placement.yaw)
@@ -308,15 +284,18 @@ def predict(
 def _case_warnings(scenario: Scenario, result: Swimming) -> list[Note]:
     """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out."""
     robot, model, batch, rate = scenario.robot, scenario.model, scenario.batch, scenario.tail_rate
-    known = robot if scenario.names_friction or not rate else _without_fitted_friction(robot)
+    known = robot  # of the user's file: without the B_eff of a calibration
+    if rate and not scenario.names_friction:
+        known = robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
+    assumed = "assumed-on-floor" if robot.has_body else "assumed-on-axis"
     return [
         *(calibration_warnings(robot, model.name) if scenario.calibrated else ()),
         *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
         *(limit.caution() for limit in broken(film_limits(robot, model, batch, result))),
         *drive_warnings(known, model, scenario.friction, result, rate),
         *_free_warnings(robot, scenario.motion),
-        *([_IN_A_FLOW] if batch.placement.flow else []),
-        *([_UNPLACED[robot.has_body]] if model.placed and not scenario.has_weight_or_place() else []),
+        *([Note.named("in-a-flow")] if batch.placement.flow else []),
+        *([Note.named(assumed)] if model.placed and not scenario.has_weight_or_place() else []),
     ]
 
 
@@ -347,11 +326,6 @@ def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: Pos
     )
 
 
-def _without_fitted_friction(robot: Robot) -> Robot:
-    """The robot of the user's file: without the B_eff of a calibration."""
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
-
-
 def _check_band(model: str) -> None:
     """Refuse a band of a model without a pose."""
     walled = [name for name, known in SWIMMER_MODELS.items() if known.placed]
@@ -367,13 +341,9 @@ def _free_warnings(robot: Robot, motion: str) -> list[Note]:
     if motion == "held":
         return []
     if robot.channel is not None:
-        words = "wall effects and weight are not modelled in this free motion: the speed is too high; use model tube"
-        return [Note("walls-left-out", words, ("motion", "channel"))]
+        return [Note.named("free-without-walls")]
     weight = robot.derived().get("submerged_weight")
     if weight is None or not weight.value:
         return []
     moves = "sinks" if weight.value > 0 else "rises"
-    words = (
-        f"the submerged weight of {show(weight.value, 'N')}, with which it {moves}, is left out; `simulate` includes it"
-    )
-    return [Note("no-weight", words, ("body.mass", "tail.density"))]
+    return [Note.named("free-without-weight", weight=show(weight.value, "N"), moves=moves)]

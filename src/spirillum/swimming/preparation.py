@@ -155,8 +155,7 @@ def _worse(name: str, error: float, allowed: float, *, yawed: bool) -> Note:
     """That a table is further off than one should be; both errors are relative."""
     off, most = show_apart(100.0 * error, 100.0 * allowed, "1", least=2)
     where = "at yawed poses between" if yawed else "between"
-    what = f"{name.replace('_', ' ')} is off by up to {off} % {where} the poses of the table"
-    return Note("table-not-checked", f"{what}; at most {most} % is expected", (name,))
+    return Note.named("table-error", name=name, what=name.replace("_", " "), off=off, where=where, most=most)
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
