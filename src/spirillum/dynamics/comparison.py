@@ -319,13 +319,10 @@ def compare_models(
         except InputError as error:
             refusals[name] = str(error)
     if not predictions:
-        raise InputError(*_nobody_answers(refusals))
+        reasons = tuple(dict.fromkeys(refusals.values()))  # an error common to all models is stated once
+        raise (
+            InputError(reasons[0])
+            if len(reasons) == 1
+            else InputError(f"no model answers: {'; '.join(reasons)}", reasons)
+        )
     return ModelComparison(ready, reading, tuple(names), predictions, refusals)
-
-
-def _nobody_answers(refusals: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
-    """One sentence with every model's reason; an error common to all models is stated once."""
-    reasons = list(dict.fromkeys(refusals.values()))
-    if len(reasons) == 1:
-        return reasons[0], ()
-    return f"no model answers: {'; '.join(reasons)}", tuple(reasons)

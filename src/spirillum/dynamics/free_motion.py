@@ -47,7 +47,7 @@ from spirillum.swimming.drives import current_at
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import prepared, table_for
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
-from spirillum.swimming.steady import Rates, Swimming, swimming_of
+from spirillum.swimming.steady import Swimming, swimming_of
 from spirillum.units import KINDS, parse_option, show
 
 _SAMPLES = 240
@@ -143,18 +143,22 @@ def free_motion(
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
     limits = reynolds_limits(batch, swimming.reynolds_number, swimming.tail_reynolds_number)
     inertia = check_stokes_flow(batch, limits)
-    checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
+    names = ("gap", "offset", "pitch", "yaw")
+    checked = compare_with_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
+    lies, slow = run.lying.state in ("steady", "orbits"), run.lying.approach_time
     stuck = sticking_notes(
         links,
         forward=float(swimming.forward_velocity[0]),
         turning=0.5 * ready.body.diameter * float(swimming.body_rotation_rate[0]),
         contact_force=run.lying.contact_force,
     )
+    few_turns = _FEW_TURNS * run.turn.time
     warnings = (
         *held.warnings,
         *(note for note in inertia.values() if note not in held.warnings),
         *(checked.notes if lies and not stuck else ()),
-        *_said(run, links, weight=weight),
+        *([NO_WEIGHT] if weight and not links.weight.any() else []),
+        *([Note.named("slow-approach", time=slow)] if run.lying.state == "steady" and slow > few_turns else []),
         *stuck,
     )
     known = lies and checked.known and not stuck
@@ -179,41 +183,19 @@ def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRob
         band=False,
     )
     links, start = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
-    return held, _driven(links, held), start
+    if held.tail_rate is None:
+        drive = held.robot.drive
+        return held, links.at_duty(1.0 if drive is None else drive.duty), start
+    changed = links.drive.copy()
+    changed[rigid_links.KIND], changed[rigid_links.DUTY] = rigid_links.RATE, 1.0
+    changed[rigid_links.GIVEN] = held.tail_rotation_rate
+    return held, replace(links, drive=changed), start
 
 
 def _check_until(until: float | None, gap: float) -> None:
     """Refuse a final gap that does not lie below the initial one."""
     if until is not None and not until < gap:
         raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
-
-
-def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
-    """The robot with its drive on, or with its tail at the requested rate."""
-    drive = held.robot.drive
-    if held.tail_rate is None:
-        return links.at_duty(1.0 if drive is None else drive.duty)
-    changed = links.drive.copy()
-    changed[rigid_links.KIND], changed[rigid_links.DUTY] = rigid_links.RATE, 1.0
-    changed[rigid_links.GIVEN] = held.tail_rotation_rate
-    return replace(links, drive=changed)
-
-
-def _checked(run: LongRun, links: TubeRobot) -> Checked:
-    """Compare the poses of the last turn with those at which the table was checked."""
-    names = ("gap", "offset", "pitch", "yaw")
-    return compare_with_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
-
-
-def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
-    """What to be careful about."""
-    found = []
-    if weight and not links.weight.any():
-        found.append(NO_WEIGHT)
-    slow = run.lying.approach_time
-    if run.lying.state == "steady" and slow > _FEW_TURNS * run.turn.time:
-        found.append(Note.named("slow-approach", time=slow))
-    return found
 
 
 def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, turns: int) -> Swimming:
@@ -247,21 +229,19 @@ def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, 
                 residual = spare - (float(motor.joint_rotor_friction[0]) * slip if held.friction == "body" else 0.0)
         else:
             current = mean("motor_current")
-    rates = {
-        "speed": mean("forward_velocity"),
-        "body_rate": body,
-        "tail_rate": tail,
-        "load": load_torque,
-        "drive": load_torque,
-        "shaft": mean("shaft_power"),
-        "friction": effective * (tail - body) ** 2
-        if held.tail_rate is not None and held.friction == "rotor"
-        else mean("friction_power"),
-        "dissipated": mean("dissipated_power"),
-        "current": current,
-        "effective": effective,
-        "residual": residual,
+    inferred = held.tail_rate is not None and held.friction == "rotor"
+    known = {
+        "forward_velocity": mean("forward_velocity"),
+        "body_rotation_rate": body,
+        "tail_rotation_rate": tail,
+        "tail_torque": abs(load_torque),
+        "drive_torque": load_torque,
+        "shaft_power": mean("shaft_power"),
+        "friction_power": effective * (tail - body) ** 2 if inferred else mean("friction_power"),
+        "dissipated_power": mean("dissipated_power"),
+        "motor_current": current,
+        "effective_friction": effective,
+        "motor_residual_torque": residual,
+        "plug_velocity": mean("mean_flow"),
     }
-    arrays = Rates(**{name: np.array([value]) for name, value in rates.items()})
-    flow = {"plug_velocity": np.array([mean("mean_flow")])}
-    return swimming_of(held.batch, arrays, np.array([True]), flow)
+    return swimming_of(held.batch, {name: np.array([value]) for name, value in known.items()}, np.array([True]))

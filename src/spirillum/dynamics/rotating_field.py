@@ -142,12 +142,13 @@ _MOST_WORK = 3e7
 class _Mean(NamedTuple):
     """Averages over one stretch of a run at one rate."""
 
-    velocity: float
-    rate: float
-    wobble: float
-    least_wobble: float
-    most_wobble: float
-    lag: float
+    forward_velocity: float
+    """Along the axis of the field, m/s."""
+    tail_rotation_rate: float
+    wobble_angle: float
+    least_wobble_angle: float
+    largest_wobble_angle: float
+    phase_lag: float
     """NaN where the robot slips."""
     state: Samples
     """At the end."""
@@ -155,12 +156,13 @@ class _Mean(NamedTuple):
     @property
     def follows(self) -> bool:
         """Whether the robot follows the field."""
-        return bool(np.isfinite(self.lag))
+        return bool(np.isfinite(self.phase_lag))
 
     def agrees(self, other: _Mean) -> bool:
         """Whether nothing has changed any more."""
-        same = abs(self.velocity - other.velocity) <= _SETTLED * max(abs(self.velocity), abs(other.velocity))
-        return same and abs(self.wobble - other.wobble) <= _STILL and self.follows == other.follows
+        here, there = self.forward_velocity, other.forward_velocity
+        same = abs(here - there) <= _SETTLED * max(abs(here), abs(there))
+        return same and abs(self.wobble_angle - other.wobble_angle) <= _STILL and self.follows == other.follows
 
 
 def magnetic_sweep(
@@ -194,6 +196,8 @@ def magnetic_sweep(
         InputError: for another drive, wrong rates, a model without all entries, or a rate at which the robot moves far
             outside Stokes flow.
     """
+    from scipy.spatial.transform import Rotation
+
     loaded = load(robot)
     if model == AUTO and loaded.channel is not None and loaded.magnetic is not None:
         raise InputError(
@@ -230,11 +234,13 @@ def magnetic_sweep(
     for done, rate in enumerate(requested):
         if progress is not None:
             progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, requested.size)
-        mean, still = _settled(links, float(rate), _pushed(attitude), turns)
+        pushed = Rotation.from_rotvec([0.0, 0.0, _TILT]) * Rotation.from_quat(attitude, scalar_first=True)
+        mean, still = _settled(links, float(rate), pushed.as_quat(scalar_first=True), turns)
         attitude = mean.state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] if mean.follows else level
         found.append(mean)
         settled.append(still)
-        inertia |= _check_stokes(batch, np.array([rate]), np.array([mean.velocity]), np.array([mean.rate]))
+        moving = np.array([mean.forward_velocity]), np.array([mean.tail_rotation_rate])
+        inertia |= _check_stokes(batch, np.array([rate]), *moving)
     notes = [] if held.robot.channel is None else [Note.named("sweep-without-walls", model=held.model.name)]
     notes += [*held.robot.warnings, *inertia.values()]
     if not all(settled):
@@ -343,22 +349,14 @@ def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _
     wobble = np.arccos(np.clip(np.abs(rotation[: last + 1, 0, 0]), 0.0, 1.0))
     span = float(time[last])
     return _Mean(
-        velocity=float(states[last, 0] - states[0, 0]) / span,
-        rate=rate - float(np.sign(rate) * slipped[last]) / span,
-        wobble=float(np.mean(wobble)),
-        least_wobble=float(np.min(wobble)),
-        most_wobble=float(np.max(wobble)),
-        lag=float(np.angle(np.mean(np.exp(1j * behind)))) if follows else np.nan,
+        forward_velocity=float(states[last, 0] - states[0, 0]) / span,
+        tail_rotation_rate=rate - float(np.sign(rate) * slipped[last]) / span,
+        wobble_angle=float(np.mean(wobble)),
+        least_wobble_angle=float(np.min(wobble)),
+        largest_wobble_angle=float(np.max(wobble)),
+        phase_lag=float(np.angle(np.mean(np.exp(1j * behind)))) if follows else np.nan,
         state=states[-1],
     )
-
-
-def _pushed(attitude: Samples) -> Samples:
-    """The attitude with the robot's axis pushed aside a little."""
-    from scipy.spatial.transform import Rotation
-
-    push = Rotation.from_rotvec([0.0, 0.0, _TILT])
-    return np.asarray((push * Rotation.from_quat(attitude, scalar_first=True)).as_quat(scalar_first=True))
 
 
 def _dataset(
@@ -372,19 +370,17 @@ def _dataset(
 ) -> xr.Dataset:
     import xarray as xr
 
-    table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
-    free = {
-        "forward_velocity": (table["velocity"], "mean velocity along the axis of the field"),
-        "tail_rotation_rate": (table["rate"], "mean rate at which the moment turns about it"),
-        "wobble_angle": (table["wobble"], "mean angle between the motor axis and the axis of the field"),
-        "least_wobble_angle": (table["least_wobble"], None),
-        "largest_wobble_angle": (table["most_wobble"], None),
-        "phase_lag": (table["lag"], "mean angle of the moment behind the field; NaN where it slips"),
-        "settled": (settled, None),
+    meanings = {
+        "forward_velocity": "mean velocity along the axis of the field",
+        "tail_rotation_rate": "mean rate at which the moment turns about it",
+        "wobble_angle": "mean angle between the motor axis and the axis of the field",
+        "phase_lag": "mean angle of the moment behind the field; NaN where it slips",
     }
+    free = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
+    source = "two rigid links, one piece, m x B"
     data: dict[str, Any] = {
-        name: ("field_rate", values, attributes(name, meaning=meaning, source="two rigid links, one piece, m x B"))
-        for name, (values, meaning) in free.items()
+        name: ("field_rate", values, attributes(name, meaning=meanings.get(name), source=source))
+        for name, values in (free | {"settled": settled}).items()
     }
     for name in ("forward_velocity", "tail_rotation_rate", "phase_lag"):
         values = np.broadcast_to(getattr(closed, name), rates.shape)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from spirillum.argument_validation import number_array
-from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.arrays import Flags, Matrix12, PerRobot, Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, interval, quantity
 from spirillum.errors import InputError
@@ -124,7 +124,6 @@ class Intervals:
         return interval(self.low[name], self.high[name], LEVEL)
 
 
-_MORE = ("wobble_angle", "path_radius", "step_out_rate", "phase_lag", "plug_velocity")
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
 
 
@@ -272,20 +271,14 @@ def _swim_block(
         else:
             state = at_rate(batch, balance, tail_rate, motor_rate, friction)
         screw = None if shared is None else Screw.of(shared, state.body_rate, state.tail_rate)
-        return _answer(batch, balance, state, screw, valid, model.mean_flow(batch))
+        return _answer(batch, model, balance, state, screw, valid)
 
 
 def _answer(
-    batch: RobotBatch,
-    s: TorqueBalance,
-    state: DriveState,
-    screw: Screw | None,
-    valid: Flags,
-    mean_flow: MeanFlow | None,
+    batch: RobotBatch, model: SwimmerModel, s: TorqueBalance, state: DriveState, screw: Screw | None, valid: Flags
 ) -> Swimming:
     body_rate, tail_rate = state.body_rate, state.tail_rate
     speed = s.speed(body_rate, tail_rate) if screw is None else screw.speed
-    slip = tail_rate - body_rate
     load = s.rotor_load(body_rate, tail_rate)
     dissipated = load * tail_rate + s.body_load(body_rate, tail_rate) * body_rate
     if batch.joint == "fixed":
@@ -295,56 +288,34 @@ def _answer(
         shaft = drive * np.where(from_field, state.driving_rate, tail_rate)
         dissipated = np.where(from_field, shaft, dissipated)
     else:
-        drive, shaft = load, load * slip
-    none: PerRobot = np.full(1, np.nan)
-    rates = Rates(
-        speed=speed,
-        body_rate=body_rate,
-        tail_rate=tail_rate,
-        load=load,
-        drive=drive,
-        shaft=shaft,
-        friction=state.torques.power(body_rate, tail_rate),
-        dissipated=dissipated,
-        current=state.current,
-        effective=state.effective,
-        residual=state.residual,
-    )
-    more = {
-        "wobble_angle": none if screw is None else screw.tilt,
-        "path_radius": none if screw is None else screw.radius,
+        drive, shaft = load, load * (tail_rate - body_rate)
+    known = {
+        "forward_velocity": speed,
+        "tail_rotation_rate": tail_rate,
+        "body_rotation_rate": body_rate,
+        "tail_torque": np.abs(load),
+        "drive_torque": drive,
+        "motor_current": state.current,
+        "effective_friction": state.effective,
+        "motor_residual_torque": state.residual,
+        "shaft_power": shaft,
+        "friction_power": state.torques.power(body_rate, tail_rate),
+        "dissipated_power": dissipated,
         "step_out_rate": state.step_out,
         "phase_lag": state.lag,
-        "plug_velocity": none if mean_flow is None else _plug_velocity(mean_flow, speed, body_rate, tail_rate),
     }
-    return swimming_of(batch, rates, valid, more)
+    if screw is not None:
+        known |= {"wobble_angle": screw.tilt, "path_radius": screw.radius}
+    if (flow := model.mean_flow(batch)) is not None:
+        moved = (flow[..., 0] + flow[..., 2]) * speed + flow[..., 1] * body_rate + flow[..., 3] * tail_rate
+        known["plug_velocity"] = moved + flow[..., 4]
+    return swimming_of(batch, known, valid)
 
 
-class Rates(NamedTuple):
-    """Steady motion, torques and powers from which all other quantities follow; SI, signed about +x."""
-
-    speed: PerRobot
-    body_rate: PerRobot
-    tail_rate: PerRobot
-    load: PerRobot
-    """T_h of (18)."""
-    drive: PerRobot
-    """Torque that turns the rotor, or the whole of one piece, against the fluid."""
-    shaft: PerRobot
-    friction: PerRobot
-    dissipated: PerRobot
-    current: PerRobot
-    """I of the motor; NaN without one."""
-    effective: PerRobot
-    """B_eff, or B of the wall."""
-    residual: PerRobot
-    """Motor torque that the reading leaves unexplained."""
-
-
-def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str, PerRobot]) -> Swimming:
-    """All quantities of steady swimming."""
-    speed, body_rate, tail_rate, load, drive, shaft, friction, dissipated, current, effective, residual = rates
-    slip = tail_rate - body_rate
+def swimming_of(batch: RobotBatch, known: Mapping[str, PerRobot], valid: Flags) -> Swimming:
+    """All quantities of steady swimming from speed, rates, torques, powers and current; NaN for what is not known."""
+    speed, tail_rate, shaft = (known[name] for name in ("forward_velocity", "tail_rotation_rate", "shaft_power"))
+    current, effective = known["motor_current"], known["effective_friction"]
     none: PerRobot = np.full(1, np.nan)
     towing = body_axial(batch)[0] * speed**2
     motor = batch.electrics
@@ -355,21 +326,11 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         lasting = run_time(motor, current)
     wire = 0.25 * np.pi * batch.wire_diameter**2 * batch.arc_length
     values = {
-        "forward_velocity": speed,
+        **{item.name: known.get(item.name, none) for item in STEADY},
         "advance_per_radian": np.where(tail_rate == 0, np.nan, speed / tail_rate),
-        "tail_rotation_rate": tail_rate,
-        "body_rotation_rate": body_rate,
-        "motor_rotation_rate": slip,
-        "tail_torque": np.abs(load),
-        "drive_torque": drive,
-        "motor_current": current,
+        "motor_rotation_rate": tail_rate - known["body_rotation_rate"],
         "battery_voltage": voltage,
-        "effective_friction": effective,
-        "motor_residual_torque": residual,
         "electrical_power": electrical,
-        "shaft_power": shaft,
-        "friction_power": friction,
-        "dissipated_power": dissipated,
         "hydrodynamic_efficiency": towing / shaft,
         "propulsive_power": towing,
         "overall_efficiency": towing / electrical,
@@ -378,7 +339,6 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         "reynolds_number": body_reynolds(batch, speed),
         "tail_reynolds_number": tail_reynolds(batch, tail_rate),
         "battery_run_time": lasting,
-        **{name: more.get(name, none) for name in _MORE},
     }
     # A motor driven beyond any root of (17), or a friction inferred at rest, is no answer either.
     moving = valid & np.isfinite(speed) & ~np.isinf(effective)
@@ -393,9 +353,3 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},
         valid=np.array(np.broadcast_to(moving, (size,))),
     )
-
-
-def _plug_velocity(mean_flow: MeanFlow, speed: PerRobot, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
-    """Mean velocity of the fluid through the channel, m/s, as `SwimmerModel.mean_flow` gives it per unit motion."""
-    per_speed = mean_flow[..., 0] + mean_flow[..., 2]
-    return per_speed * speed + mean_flow[..., 1] * body_rate + mean_flow[..., 3] * tail_rate + mean_flow[..., 4]
