@@ -17,7 +17,6 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress, Reach, integrate, observed_at
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
-from spirillum.dynamics.run_summary import DutyInterval
 from spirillum.dynamics.start import InitialPose, released_state
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
@@ -206,9 +205,10 @@ def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, 
     start = state.copy()
     start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0
     start[rigid_links.CURRENT + 1 :] = 0.0
-    followed = integrate(links, start, moments, [Switch(0.0, duty)], Reach())
+    switches = [Switch(0.0, duty)]
+    followed = integrate(links, start, moments, switches, Reach())
     more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
-    series = dataset_of(held, links, followed, [DutyInterval(0.0, float(followed.time[-1]))], more, {})
+    series = dataset_of(held, links, followed, switches, more, {})
 
     def mean(name: str) -> float:
         return float(np.trapezoid(series[name].values, followed.time) / followed.time[-1])

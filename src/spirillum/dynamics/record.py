@@ -10,8 +10,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot
-from spirillum.dynamics.integration import Reach, Trajectory
-from spirillum.dynamics.run_summary import STEADY, DutyInterval, run_averages
+from spirillum.dynamics.integration import BATTERY_EMPTY, Reach, Trajectory
+from spirillum.dynamics.run_summary import STEADY, run_averages, stretches_on
+from spirillum.dynamics.timing import Switch
 from spirillum.kernels import rigid_links
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
@@ -37,13 +38,15 @@ def dataset_of(
     prediction: Prediction,
     links: FreeRobot,
     run: Trajectory,
-    on: Sequence[DutyInterval],
+    switches: Sequence[Switch],
     more: Mapping[str, Samples],
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """The run of a free robot."""
     import xarray as xr
 
+    driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
+    on = stretches_on(switches, driven, float(run.time[0]))
     rotation = _rotations(run.states)
     series = {**series_of(prediction, links, run), **more}
     weight, phase = links.weight, run.states[:, rigid_links.PHASE]

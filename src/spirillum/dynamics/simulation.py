@@ -11,10 +11,10 @@ import numpy as np
 
 from spirillum.dynamics.axial_robot import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
-from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
+from spirillum.dynamics.integration import Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
-from spirillum.dynamics.run_summary import stretches_on, vertical_drift
+from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.dynamics.start import links_without_walls, reach_of, resting_state, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
@@ -219,16 +219,12 @@ def _free_run(
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])
     run = integrate(links, start, moments, switches, reach, progress).require_completion()
-    driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
-    on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
     notes = [*steady.warnings, *([Note.named("film-alone")] if steady.robot.channel is not None else [])]
     notes += [*([NO_WEIGHT] if weight and not links.weight.any() else []), *unused]
-    more = {}
-    if links.is_walled:
-        more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.roughness
+    more = {"wall_gap": run.observed[:, rigid_links.FILM] + links.roughness} if links.is_walled else {}
     attrs = free_attributes(steady, links, run, reach, title, notes)
-    dataset = dataset_of(steady, links, run, on, more, attrs)
+    dataset = dataset_of(steady, links, run, switches, more, attrs)
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     way = [*vertical_drift(dataset), *check_stokes_flow(steady.batch, limits).values()]
     dataset.attrs |= note_attributes([*way, *notes])

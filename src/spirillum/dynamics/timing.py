@@ -107,35 +107,10 @@ def duration_of(turns: float, turn: float, duration: str | float | None) -> floa
     return end
 
 
-def check_samples(samples_per_turn: int) -> None:
-    """Refuse a number of samples a turn that is none."""
-    check_range("samples-per-turn", samples_per_turn, 1, _MOST_A_TURN, " a turn")
-
-
-def sample_times(end: float, turn: float, samples_per_turn: int, switches: Sequence[float] = ()) -> Samples:
-    """Evenly spaced times from 0 to `end`, s.
-
-    A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
-    which of the two is rounded up.
-    """
-    check_samples(samples_per_turn)
-    count = math.ceil(end / turn * samples_per_turn)
-    if count > _LARGEST_SAMPLES:
-        raise InputError(
-            f"samples-per-turn = {samples_per_turn} makes {count} samples in {end:g} s; allowed: at most "
-            f"{_LARGEST_SAMPLES} in all, as of a shorter time"
-        )
-    time = np.linspace(0.0, end, max(count, 1) + 1)
-    for switch in switches:
-        nearest = round(switch / end * (time.size - 1))
-        if 0 < nearest < time.size - 1 and abs(time[nearest] - switch) < _ROUNDING * time[1]:
-            time[nearest] = switch
-    return time
-
-
 def _whole(value: Any) -> Any:
     if not is_whole(value):
-        raise InputError(f"samples-per-turn = {str(value)[:40]}; allowed: a whole number from 1 to 10000")
+        raise InputError(f"samples-per-turn = {str(value)[:40]}; allowed: a whole number from 1 to {_MOST_A_TURN}")
+    check_range("samples-per-turn", int(value), 1, _MOST_A_TURN, " a turn")
     return int(value)
 
 
@@ -201,7 +176,6 @@ class Timing(Options):
         end = stated_duration(self.turns, self.duration)
         if end is not None and "turns" in self.model_fields_set:
             raise InputError(f"turns = {self.turns:g} together with a duration; allowed: one of them")
-        check_samples(self.samples_per_turn)
         schedule(self.on, self.duty, 1.0, math.inf if end is None else end)
 
     def of_trial(self) -> Timing:
@@ -210,10 +184,24 @@ class Timing(Options):
         return self if given else self.model_copy(update={"duration": TRIAL_DURATION})
 
     def timetable(self, turn: float, duty: float) -> Timetable:
-        """The times of a run."""
+        """The times of a run.
+
+        A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
+        which of the two is rounded up.
+        """
         end = duration_of(self.turns, turn, self.duration)
         switches = schedule(self.on, self.duty, duty, end)
-        time = sample_times(end, turn, self.samples_per_turn, [switch.time for switch in switches])
+        count = math.ceil(end / turn * self.samples_per_turn)
+        if count > _LARGEST_SAMPLES:
+            raise InputError(
+                f"samples-per-turn = {self.samples_per_turn} makes {count} samples in {end:g} s; allowed: at most "
+                f"{_LARGEST_SAMPLES} in all, as of a shorter time"
+            )
+        time = np.linspace(0.0, end, max(count, 1) + 1)
+        for switch in switches:
+            nearest = round(switch.time / end * (time.size - 1))
+            if 0 < nearest < time.size - 1 and abs(time[nearest] - switch.time) < _ROUNDING * time[1]:
+                time[nearest] = switch.time
         return Timetable(end, time, switches, self._unused(switches, end))
 
     def _unused(self, switches: Sequence[Switch], end: float) -> list[Note]:

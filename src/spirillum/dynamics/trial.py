@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import is_held, state_of
 from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
@@ -117,28 +118,6 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     return ReleasedMotion(values, basis)
 
 
-def steady_of(follow: Callable[[], Prediction]) -> ReleasedMotion:
-    """Return the steady motion of a released robot."""
-    try:
-        motion = follow()
-    except InputError as error:
-        return ReleasedMotion(reason=str(error))
-    lying = motion.lying
-    assert lying is not None  # noqa: S101 - a free motion in the tube has one
-    basis: dict[str, Any] = {
-        "assumption": ASSUMPTION,
-        "state": state_of(lying, motion.warnings),
-        "statement": lying.statement,
-        "time_constant": quantity(lying.approach_time, "s"),
-        "warnings": [str(note) for note in motion.warnings],
-    }
-    pose = {name: float(getattr(lying, name)) for name in (*_POSE, "contact_force")}
-    moving: Mapping[str, float] = {}
-    if lying.state != "changing":  # its means depend on when they are taken
-        moving = {item.name: value for item in STEADY if np.isfinite(value := float(getattr(motion, item.name)))}
-    return ReleasedMotion({**moving, **pose}, basis)
-
-
 RUNS = 64
 """Runs over the unknowns: a power of two, at which Sobol' points fill space evenly."""
 _SEED = 36
@@ -176,54 +155,9 @@ class TrialUnknown(NamedTuple):
         return {"name": self.name, "distribution": self.kind, **ends, "share": quantity(share, "1")}
 
 
-UNKNOWNS = (
-    TrialUnknown("wait", "log-uniform", 10.0, 600.0, "s", "nobody states it: from a quick hand to ten minutes"),
-    TrialUnknown(
-        "roughness", "log-uniform", 1e-4, 1e-2, "body's radius", "from a smooth hull to glued and printed stripes"
-    ),
-    TrialUnknown(
-        "friction_coefficient", "uniform", 0.0, 0.3, "1", "lubricated surfaces 0.05 to 0.15; from none to dry plastics"
-    ),
-    TrialUnknown(
-        "weight",
-        "uniform",
-        0.9,
-        1.1,
-        "weight in the fluid",
-        "the difference of mass and displaced mass, each to 1 or 2 %",
-    ),
-    TrialUnknown(
-        "friction.effective",
-        "log-uniform",
-        1.0,
-        20.0,
-        "the rotor's own B_m",
-        "no seal has less than the bearings alone; B_eff inferred from trials is 10 to 16 times that",
-    ),
-    TrialUnknown(
-        "fluid.cavitation_pressure",
-        "log-uniform",
-        1e4,
-        1e5,
-        "Pa",
-        "one atmosphere for a liquid without gas; one with dissolved air may cavitate at a tenth of it",
-    ),
-    TrialUnknown(
-        "body.center_of_mass.x",
-        "uniform",
-        -0.05,
-        0.05,
-        "body's length",
-        "battery and motor fill the body unevenly; about the centre of a body of uniform density",
-    ),
-    TrialUnknown(
-        "body.center_of_mass.radial",
-        "uniform",
-        0.0,
-        0.05,
-        "body's radius",
-        "from a body that is balanced on its axis to parts that lie off it by their clearance",
-    ),
+UNKNOWNS = tuple(
+    TrialUnknown(**{**row, "low": float(row["low"]), "high": float(row["high"])})
+    for row in map(dict[str, Any], rows_of("dynamics/trial_unknowns.csv"))
 )
 """What the interval of a trial is over, in the order of the columns of its sample."""
 
@@ -264,7 +198,12 @@ def samples_of(
             fields["body.mass"] = robot.body.mass + (own["weight"] - 1.0) * weight / STANDARD_GRAVITY
         if "friction.effective" in own and robot.motor is not None:
             fields["friction.effective"] = own["friction.effective"] * robot.motor.rotor_friction
-        one = _with_center(with_numbers(robot, fields), own)
+        one = with_numbers(robot, fields)
+        if _AXIAL in own:
+            x = float(links_of(one).body.centre[0]) + own[_AXIAL] * one.body.length
+            radial = 0.5 * one.body.diameter * own[_RADIAL]
+            center = CenterOfMass().model_copy(update={"x": x, "radial": radial})
+            one = one.model_copy(update={"body": one.body.model_copy(update={"center_of_mass": center})})
         height = 0.5 * robot.body.diameter * own["roughness"] if "roughness" in own else None
         found.append(TrialSample(one, own.get("wait"), height, own.get("friction_coefficient")))
     return found
@@ -280,16 +219,6 @@ def samples_of_draws(
         samples_of(drawn[number % len(kept)], weight, unknowns, own[None])[0]._replace(draw=kept[number % len(kept)])
         for number, own in enumerate(_shares(unknowns))
     ]
-
-
-def _with_center(robot: Robot, own: Mapping[str, float]) -> Robot:
-    """The robot with the centre of mass of a sample, where that is open."""
-    if _AXIAL not in own:
-        return robot
-    body = robot.body
-    x = float(links_of(robot).body.centre[0]) + own[_AXIAL] * body.length
-    center = CenterOfMass().model_copy(update={"x": x, "radial": 0.5 * body.diameter * own[_RADIAL]})
-    return robot.model_copy(update={"body": body.model_copy(update={"center_of_mass": center})})
 
 
 def with_interval(
@@ -386,9 +315,6 @@ def quick_run(
     )
 
 
-_ANNOUNCED = ("forward_velocity", "tail_rotation_rate")
-
-
 @dataclass(frozen=True)
 class TrialRequest:
     """Arguments of `spirillum.predict` that decide the released motions of a robot."""
@@ -458,8 +384,13 @@ class TrialRequest:
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""
-        nominal = self._run(held)
-        self._announce("trial", *map(nominal.values.get, _ANNOUNCED))
+        from spirillum.dynamics.simulation import simulate  # its equations are compiled
+
+        settings: dict[str, Any] = {"in_tube": self.in_tube, "timing": {"duration": self._length}}
+        settings |= {"calibration": self.fit, "draws": None if self.fit.posterior is None else 0}
+        settings |= {"model": WALLED, "progress": self.progress, "calibrated": self.calibrated}
+        nominal = trial_of(held, lambda: simulate(**self._shared(), **settings), self._length)
+        self._announce("trial", *(nominal.values.get(name) for name in ("forward_velocity", "tail_rotation_rate")))
         return self._with_interval(held, nominal) if self.interval else nominal
 
     def steady(self) -> ReleasedMotion:
@@ -467,19 +398,25 @@ class TrialRequest:
         from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
 
         still = self.in_tube.model_copy(update={"wait": None})
-        shared = {**self._shared(), "progress": None}
-        found = steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=self.fit, **shared).prediction)
-        self._announce("steady", *map(found.values.get, _ANNOUNCED))
-        return found
-
-    def _run(self, held: Prediction) -> ReleasedMotion:
-        """The trial at nominal unknowns."""
-        from spirillum.dynamics.simulation import simulate  # its equations are compiled
-
-        robot, length = self._resolved(), self._length
-        settings = {"in_tube": self.in_tube, "timing": {"duration": length}, **self._shared()}
-        settings |= {"calibration": self.fit, "draws": None if self.fit.posterior is None else 0}
-        return trial_of(held, lambda: simulate(robot, model=WALLED, calibrated=self.calibrated, **settings), length)
+        try:
+            motion = free_motion(in_tube=still, fit=self.fit, **self._shared()).prediction
+        except InputError as error:
+            return ReleasedMotion(reason=str(error))
+        lying = motion.lying
+        assert lying is not None  # noqa: S101 - a free motion in the tube has one
+        basis: dict[str, Any] = {
+            "assumption": ASSUMPTION,
+            "state": state_of(lying, motion.warnings),
+            "statement": lying.statement,
+            "time_constant": quantity(lying.approach_time, "s"),
+            "warnings": [str(note) for note in motion.warnings],
+        }
+        values: dict[str, float] = {}
+        if lying.state != "changing":  # its means depend on when they are taken
+            values = {item.name: value for item in STEADY if np.isfinite(value := float(getattr(motion, item.name)))}
+        self._announce("steady", values.get("forward_velocity"), values.get("tail_rotation_rate"))
+        pose = {name: float(getattr(lying, name)) for name in (*_POSE, "contact_force")}
+        return ReleasedMotion({**values, **pose}, basis)
 
     @property
     def _length(self) -> float:
@@ -487,13 +424,9 @@ class TrialRequest:
         return TRIAL_DURATION if self.duration is None else self.duration
 
     def _shared(self) -> dict[str, Any]:
-        """What all runs take of the request."""
-        names = ("friction", "placement", "roughness", "progress")
-        return {name: getattr(self, name) for name in names}
-
-    def _resolved(self) -> Robot:
-        """The robot with the requested resolution, which a run refuses: the reason of its column."""
-        return with_resolution(self.robot, self.resolution, WALLED)
+        """What both released motions take of the request, with the resolution, which a run refuses: its reason."""
+        robot = with_resolution(self.robot, self.resolution, WALLED)
+        return {name: getattr(self, name) for name in ("friction", "placement", "roughness")} | {"robot": robot}
 
     def _with_interval(self, held: Prediction, nominal: ReleasedMotion) -> ReleasedMotion:
         """The trial with its interval over what neither robot, request nor calibration states."""

@@ -9,7 +9,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import (
-    BATTERY_EMPTY,
     INTERRUPTED,
     Checkpoint,
     Event,
@@ -20,7 +19,6 @@ from spirillum.dynamics.integration import (
 )
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
-from spirillum.dynamics.run_summary import stretches_on
 from spirillum.dynamics.start import InitialPose, reach_of, released_state
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
@@ -81,8 +79,6 @@ def tube_run(
         if isinstance(start, InitialPose):
             raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
         raise InputError(f"the run cannot be continued: {what}; allowed: a run that ended where it can go on")
-    driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
-    on = stretches_on(times.switches, driven, float(run.time[0]))
     ended = float(run.time[-1])
     notes = [*steady.warnings]
     if ended < times.end:
@@ -107,7 +103,7 @@ def tube_run(
         found["tail_angle"] = tail_angle_of(run.states, begun)
         turns = np.round((float(start["azimuth"][-1]) - found["azimuth"][0]) / (2.0 * np.pi))
         found["azimuth"] = found["azimuth"] + 2.0 * np.pi * turns
-    dataset = dataset_of(steady, robot, run, on, found, attrs)
+    dataset = dataset_of(steady, robot, run, times.switches, found, attrs)
     kept = np.isin(run.time, times.time) | (run.time == ended)
     return dataset if kept.all() else dataset.isel(time=kept)
 
