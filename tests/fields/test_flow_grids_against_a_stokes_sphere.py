@@ -162,7 +162,7 @@ def test_wrong_grids_are_named(around: Flow, arguments: dict[str, Any], words: s
 
 
 def test_the_largest_allowed_resolution_is_one_that_is_accepted(around: Flow) -> None:
-    from spirillum.fields.flow import box_around
+    from spirillum.fields.grid import box_around
 
     with pytest.raises(sp.InputError) as caught:
         box_around(around.robot, None, 1000)

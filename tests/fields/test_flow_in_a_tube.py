@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.fields.flow import box_around, plane_around, seat_in_tube
+from spirillum.fields.flow import seat_in_tube
+from spirillum.fields.grid import box_around, plane_around
 
 WIDE, R = "biorob2012-wide", 0.02
 PLACE = {"gap": "5 mm", "pitch": "2 deg"}

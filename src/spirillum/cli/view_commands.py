@@ -112,7 +112,8 @@ def flow(
     Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
     """
     from spirillum.cli import renderer
-    from spirillum.fields.flow import box_around, flow_answer, plane_around, seat_in_tube
+    from spirillum.fields.flow import flow_answer, seat_in_tube
+    from spirillum.fields.grid import box_around, plane_around
     from spirillum.files import guard_inputs
     from spirillum.fluid.tube.domain import pose_of
 

@@ -247,9 +247,14 @@ def control(
     _check(controller, seed, seeds, workers, arguments)
     robot, arguments["calibration"] = load(robot), read_fit(arguments.get("calibration"))
     nominal = plant_of(robot, arguments, SampledErrors(1.0, 1.0), progress)
-    lab, cautions = _without_unknown_flow(lab, nominal.model)
+    cautions: list[Note] = []
+    if nominal.model != "tube" and lab.pulse.velocity:  # without walls there is no imposed flow
+        lab = lab.model_copy(update={"pulse": lab.pulse.model_copy(update={"velocity": 0.0})})
+        cautions = [Note.named("pulse-left-out", model=nominal.model)]
     job = ControlJob(robot, arguments, task, task.brief(nominal, lab, progress), controller, seed)
-    _check_memory(job.brief.duration, lab)
+    duration, rate = job.brief.duration, lab.camera.fps + lab.meter.rate + 2.0 / lab.remote.period
+    cause = f"task.duration = {show(duration, 's')} with {rate:.4g} frames, readings, decisions and commands a second"
+    check_memory(cause, duration * rate, "events", _EVENT, "as with a shorter duration or a lower camera.fps")
     actual, drawn = draw_plant(job)
     learner = Learner(lab, Bank(robot, lab.unknown, arguments, progress)) if learn else None
     pace = _Pace() if live else None
@@ -297,14 +302,6 @@ class _Pace:
         self.late = max(0.0, -left)
 
 
-def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[Note]]:
-    """A lab without the pulse of flow for a model without imposed flow, and the sentence about it."""
-    if model == "tube" or not lab.pulse.velocity:
-        return lab, []
-    still = lab.pulse.model_copy(update={"velocity": 0.0})
-    return lab.model_copy(update={"pulse": still}), [Note.named("pulse-left-out", model=model)]
-
-
 def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[Note]]:
     """Scores of every controller from every seed; with an interrupt of the runs that are done, and a sentence."""
     jobs = [replace(job, controller=name, seed=job.seed + n) for n in range(seeds) for name in CONTROLLERS]
@@ -331,12 +328,6 @@ def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
     return record(run, plant).assign_attrs(
         control=json.dumps(settings, sort_keys=True), task=job.task.kind, controller=job.controller, seed=job.seed
     )
-
-
-def _check_memory(duration: float, lab: Lab) -> None:
-    rate = lab.camera.fps + lab.meter.rate + 2.0 / lab.remote.period
-    cause = f"task.duration = {show(duration, 's')} with {rate:.4g} frames, readings, decisions and commands a second"
-    check_memory(cause, duration * rate, "events", _EVENT, "as with a shorter duration or a lower camera.fps")
 
 
 def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapping[str, Any]) -> None:

@@ -17,17 +17,16 @@ r - x is the integral of the speed's error: a robot that slows down evenly is fo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator
 
 from spirillum.arrays import Samples
-from spirillum.controllers.estimators import PositionFilter
+from spirillum.controllers.estimators import PositionController
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
-from spirillum.controllers.sensors import Controller, Detection, FlowPulse, Message
+from spirillum.controllers.sensors import Controller, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
@@ -45,47 +44,21 @@ _SLOWEST = 0.05  # the estimated speed at full duty counts as at least this shar
 _EXACT = {"camera": {"position_noise": 1e-6, "position_wander": 0.0}}
 
 
-class _Watching(Controller):
-    """A controller that follows the robot; an oracle is given position and coming flow."""
+class _CourseController(PositionController):
+    """A controller of a course, whose speed changes little."""
 
     def __init__(self, lab: Lab, speed: float, duty: float, *, knowing: bool = False) -> None:
-        self.knowing = self.blind = knowing
         seen = lab if not knowing else Lab.of(_EXACT).model_copy(update={"remote": lab.remote})
-        self._follower = PositionFilter(seen, speed / duty, walk=_WALK, drift=_DRIFT)
-        self._full, self._delay = speed / duty, lab.remote.delay
-        self._way = float(np.sign(speed))
-        self._duty = duty
-        self._now: Samples = np.array([0.0, self._full, 0.0, 0.0])
-        self._error = 0.0
+        super().__init__(seen, speed, duty, knowing=knowing, walk=_WALK, drift=_DRIFT)
 
     def _follow(self, news: Message) -> Samples:
-        """Predicted position, speed at full duty, drift and camera error when a command issued now will act."""
-        for sight in news.sights if news.truth is None else ():
-            self._follower.see(sight)
-        if news.truth is not None:
-            self._follower.see(Detection(news.time, float(news.truth.pose.position[0]), 0.0, 0.0, 0.0))
-        self._now, spread = self._follower.ahead(news.time)
-        self._error = float(np.sqrt(spread[0, 0]))
-        ahead, _ = self._follower.ahead(news.time + self._delay)
-        least = _SLOWEST * abs(self._full)
-        ahead[1] = self._way * max(self._way * ahead[1], least)
+        """See `PositionController`; the speed counts as at least a share of the predicted one."""
+        ahead = super()._follow(news)
+        ahead[1] = self._way * max(self._way * ahead[1], _SLOWEST * abs(self._full))
         return ahead
 
-    def _sent(self, news: Message, duty: float) -> float:
-        self._follower.send(news.time, duty)
-        return duty
 
-    def estimate(self) -> Mapping[str, float]:
-        """Position, its standard deviation, speed at the robot's own duty, and drift."""
-        return {
-            "estimated_position": float(self._now[0]),
-            "estimated_position_error": self._error,
-            "estimated_speed": float(self._now[1] * self._duty),
-            "estimated_drift": float(self._now[2]),
-        }
-
-
-class KeepCourse(_Watching):
+class KeepCourse(_CourseController):
     """A course at a set speed, by PWM; bounded, it holds the speed and gives up what a pulse of flow took."""
 
     def __init__(
@@ -116,7 +89,7 @@ class KeepCourse(_Watching):
         return self._sent(news, float(np.clip(unlimited, 0.0, 1.0)))
 
 
-class SaveBattery(_Watching):
+class SaveBattery(_CourseController):
     """A course at a set mean speed, with a remote that knows on and off."""
 
     def __init__(

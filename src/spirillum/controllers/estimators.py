@@ -26,7 +26,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab, Unknown
-from spirillum.controllers.sensors import Detection, SampledErrors, plant_of
+from spirillum.controllers.sensors import Controller, Detection, Message, SampledErrors, plant_of
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, Snapshot, uninterrupted
 from spirillum.errors import InputError
@@ -159,7 +159,7 @@ class PositionFilter:
 
     def see(self, sight: Detection) -> None:
         """Take in a sight."""
-        self._mean, self._spread = self._moved(sight.time)
+        self._mean, self._spread = self.ahead(sight.time)
         self._time = sight.time
         while len(self._sent) > 1 and self._sent[1][0] <= self._time:
             self._sent.popleft()
@@ -174,18 +174,12 @@ class PositionFilter:
 
     def ahead(self, time: float) -> tuple[Samples, Samples]:
         """Mean (x, s, w, b) and covariance at a time, with the commands that have been sent; SI."""
-        return self._moved(time)
-
-    def duty_at(self, time: float) -> float:
-        """Duty that acts at a time if no command was lost."""
-        return [duty for start, duty in self._sent if start <= time][-1]
-
-    def _moved(self, time: float) -> tuple[Samples, Samples]:
         mean, spread, now = self._mean, self._spread, self._time
         edges = [start for start, _ in self._sent if now < start < time]
         for after in [*edges, time]:
             if after > now:
-                mean, spread = self._stepped(mean, spread, after - now, self.duty_at(now))
+                duty = [duty for start, duty in self._sent if start <= now][-1]
+                mean, spread = self._stepped(mean, spread, after - now, duty)
                 now = after
         return mean, spread
 
@@ -198,3 +192,47 @@ class PositionFilter:
         spread[2, 2] += self._drift**2 * (1.0 - left**2)
         spread[3, 3] += self._wander**2 * (1.0 - kept**2)
         return moves @ mean, spread
+
+
+class PositionController(Controller):
+    """A controller that follows the robot by the filter; an oracle is given its position."""
+
+    def __init__(
+        self,
+        lab: Lab,
+        speed: float,
+        duty: float,
+        *,
+        knowing: bool = False,
+        walk: float = _SPEED_WALK,
+        drift: float = _DRIFT,
+    ) -> None:
+        self.knowing = self.blind = knowing
+        self._follower = PositionFilter(lab, speed / duty, walk=walk, drift=drift)
+        self._full, self._delay = speed / duty, lab.remote.delay
+        self._way, self._duty = float(np.sign(speed)), duty
+        self._now: Samples = np.array([0.0, self._full, 0.0, 0.0])
+        self._error = 0.0
+
+    def _follow(self, news: Message) -> Samples:
+        """Predicted position, speed at full duty, drift and camera error when a command issued now will act."""
+        for sight in news.sights if news.truth is None else ():
+            self._follower.see(sight)
+        if news.truth is not None:
+            self._follower.see(Detection(news.time, float(news.truth.pose.position[0]), 0.0, 0.0, 0.0))
+        self._now, spread = self._follower.ahead(news.time)
+        self._error = float(np.sqrt(spread[0, 0]))
+        return self._follower.ahead(news.time + self._delay)[0]
+
+    def _sent(self, news: Message, duty: float) -> float:
+        self._follower.send(news.time, duty)
+        return duty
+
+    def estimate(self) -> Mapping[str, float]:
+        """Position, its standard deviation, speed at the robot's own duty, and drift."""
+        return {
+            "estimated_position": float(self._now[0]),
+            "estimated_position_error": self._error,
+            "estimated_speed": float(self._now[1] * self._duty),
+            "estimated_drift": float(self._now[2]),
+        }

@@ -127,8 +127,11 @@ class _Loop:
         if waiting:
             self._arrived = max(self._arrived, self.senses.pictured + self.lab.camera.latency)
         silent = not self.controller.blind and time - self._arrived > self._patience
-        if waiting and not silent:
-            return self.swim_until_seen(time, waiting)
+        if waiting and not silent:  # the robot swims at its own duty while its look is learnt, but not for ever
+            if time > _LONGEST_WAIT:
+                self.run.ended = f"nothing is seen after {time:.3g} s: {waiting}"
+                return False
+            return self.send(time, self.own, {})
         truth = self.now() if self.controller.knowing else None
         asked = self.controller.decide(Message(time, tuple(self._sights), tuple(self._readings), truth))
         command = asked if isinstance(asked, Command) else Command(float(asked))
@@ -140,13 +143,6 @@ class _Loop:
             command = Command(0.0)
             self.run.silent = time if self.run.silent is None else self.run.silent
         return self.send(time, command, dict(self.controller.estimate()))
-
-    def swim_until_seen(self, time: float, waiting: str) -> bool:
-        """Swim at the robot's own duty while its look is learnt, but not for ever; whether there is still time."""
-        if time > _LONGEST_WAIT:
-            self.run.ended = f"nothing is seen after {time:.3g} s: {waiting}"
-            return False
-        return self.send(time, self.own, {})
 
     def send(self, time: float, command: Command, estimate: dict[str, float]) -> bool:
         """Note a decision and send it."""

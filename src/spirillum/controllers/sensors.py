@@ -19,7 +19,7 @@ from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.dynamics.rotating_field import Field
 from spirillum.errors import InputError
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
 
 
@@ -212,29 +212,14 @@ def plant_of(
             )
         gap = gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter)
         arguments["placement"] = placed.model_copy(update={"gap": gap * drawn.gap})
-    if drawn.friction != 1.0:
-        robot = _with_friction(robot, drawn.friction)
-    robot = _with_supply_and_fluid(robot, drawn)
-    return Plant(robot, **arguments, progress=progress)
-
-
-def _with_friction(robot: Robot, factor: float) -> Robot:
-    """A robot whose friction, if it has any, is multiplied by a factor."""
     effective = robot.friction.effective
     if effective is None and robot.motor is not None:
         effective = robot.motor.joint_rotor_friction
-    if not effective:
-        return robot
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": factor * effective})})
-
-
-def _with_supply_and_fluid(robot: Robot, drawn: SampledErrors) -> Robot:
-    """A robot with the sampled voltage and viscosity."""
-    changes: dict[str, Any] = {}
+    changes: dict[str, float] = {}
+    if drawn.friction != 1.0 and effective:
+        changes["friction.effective"] = drawn.friction * effective
     if drawn.viscosity != 1.0:
-        fluid = robot.fluid
-        changes["fluid"] = fluid.model_copy(update={"viscosity": fluid.viscosity * drawn.viscosity})
+        changes["fluid.viscosity"] = robot.fluid.viscosity * drawn.viscosity
     if drawn.voltage != 1.0 and robot.battery is not None:
-        battery = robot.battery
-        changes["battery"] = battery.model_copy(update={"voltage": battery.voltage * drawn.voltage})
-    return robot.model_copy(update=changes) if changes else robot
+        changes["battery.voltage"] = robot.battery.voltage * drawn.voltage
+    return Plant(with_numbers(robot, changes), **arguments, progress=progress)

@@ -12,13 +12,12 @@ between two decisions (Tsypkin 1984).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.controllers.estimators import PositionFilter
+from spirillum.controllers.estimators import PositionController
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import Controller, FlowPulse, Message
@@ -34,37 +33,19 @@ _SHORT = 0.5  # b over the tolerance
 _HYSTERESIS = 0.1  # h over the tolerance
 
 
-class StopController(Controller):
+class StopController(PositionController):
     """From camera alone."""
 
     def __init__(self, lab: Lab, speed: float, duty: float, goal: float, tolerance: float) -> None:
-        self._follower = PositionFilter(lab, speed / duty)
-        self._delay, self._duty, self._way = lab.remote.delay, duty, float(np.sign(speed))
+        super().__init__(lab, speed, duty)
         self._aim, self._back = goal - self._way * _SHORT * tolerance, _HYSTERESIS * tolerance
         self._on = True
-        self._estimate = {"estimated_position": 0.0, "estimated_speed": speed, "estimated_drift": 0.0}
 
     def decide(self, news: Message) -> float:
         """On while the aim is ahead of where the robot will be when the command acts."""
-        for sight in news.sights:
-            self._follower.see(sight)
-        mean, _spread = self._follower.ahead(news.time + self._delay)
-        left = self._way * (self._aim - mean[0])
+        left = self._way * (self._aim - self._follow(news)[0])
         self._on = left > (0.0 if self._on else self._back)
-        duty = self._duty if self._on else 0.0
-        now, around = self._follower.ahead(news.time)
-        self._estimate = {
-            "estimated_position": float(now[0]),
-            "estimated_position_error": float(np.sqrt(around[0, 0])),
-            "estimated_speed": float(now[1] * self._duty),
-            "estimated_drift": float(now[2]),
-        }
-        self._follower.send(news.time, duty)
-        return duty
-
-    def estimate(self) -> Mapping[str, float]:
-        """Position, its standard deviation, speed while on, and drift."""
-        return self._estimate
+        return self._sent(news, self._duty if self._on else 0.0)
 
 
 class Timed(Controller):

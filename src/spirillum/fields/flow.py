@@ -16,7 +16,15 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity, with_notes_last
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fields.fluid_field import FluidField, flow_field
-from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane_grid, volume_grid
+from spirillum.fields.grid import (
+    PLANE_RESOLUTION,
+    VOLUME_RESOLUTION,
+    PointGrid,
+    Progress,
+    box_around,
+    dataset_on,
+    plane_around,
+)
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fluid.tube.domain import pose_of
 from spirillum.notes import Note, note_attributes
@@ -29,7 +37,7 @@ from spirillum.robot.tube_pose import TubePose
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import prepared
-from spirillum.units import KINDS, Kind, parse_option
+from spirillum.units import KINDS, parse_option
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -39,10 +47,7 @@ if TYPE_CHECKING:
 FLOW_MODELS = ("slender", "tube")
 """The models whose tractions give a flow: in unbounded fluid, and in the channel."""
 Frame = Literal["lab", "body"]
-_OFFSET = Kind("length", "m", "5 mm", "-100 m", "100 m")
 _MOTION = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
-PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
-"""Points along the longest side of a plane and of a box."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,29 +129,14 @@ class Flow(DisplayMixin):
         Raises:
             InputError: if they have another shape or are not finite.
         """
-        return np.asarray(self.field.inside(_checked(points)), dtype=bool)
+        return np.asarray(self.field.inside(points), dtype=bool)
 
     def velocity(self, points: Samples) -> Samples:
-        """Velocity of the fluid in the chosen frame, m/s, (n, 3).
-
-        Args:
-            points: (n, 3), m.
-
-        Raises:
-            InputError: if one of them lies inside a solid or outside the tube (the sentence names point and part), is
-                not finite, or has another shape.
-        """
+        """Velocity of the fluid in the chosen frame, m/s, (n, 3); arguments as for `fields`."""
         return self.fields(points)[0]
 
     def pressure(self, points: Samples) -> Samples:
-        """Pressure of the fluid, Pa, (n,): above that far away, or in a tube above the mean of both ends.
-
-        Args:
-            points: (n, 3), m.
-
-        Raises:
-            InputError: if one of them lies inside a solid or outside the tube, is not finite, or has another shape.
-        """
+        """Pressure, Pa, (n,), above that far away, in a tube above the mean of both ends; arguments as for `fields`."""
         return self.fields(points)[1]
 
     def fields(self, points: Samples) -> tuple[Samples, Samples]:
@@ -156,9 +146,10 @@ class Flow(DisplayMixin):
             points: (n, 3), m.
 
         Raises:
-            InputError: if one of them lies inside a solid or outside the tube, is not finite, or has another shape.
+            InputError: if one of them lies inside a solid or outside the tube (the sentence names point and part), is
+                not finite, or has another shape.
         """
-        velocity, pressure = self.field.fields(_checked(points))
+        velocity, pressure = self.field.fields(points)
         if self.frame == "body":
             velocity = velocity - self.prediction.forward_velocity * self.heading
         return velocity, pressure
@@ -314,28 +305,6 @@ def seat_in_tube(
     return pose_of(prepared(robot, chosen, placement=placement, resolution=resolution)[2])
 
 
-def plane_around(
-    robot: Robot,
-    plane: str = "xz",
-    offset: str | float = 0.0,
-    extent: str | float | None = None,
-    resolution: int = PLANE_RESOLUTION,
-    seat: TubePose | None = None,
-) -> PointGrid:
-    """The grid of `Flow.plane`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
-    plane = "".join(sorted(str(plane)))
-    check_choice("plane", plane, PLANES)
-    at = parse_option("offset", offset, _OFFSET)
-    return plane_grid(robot, plane, at, _margin(extent), resolution, seat)
-
-
-def box_around(
-    robot: Robot, extent: str | float | None = None, resolution: int = VOLUME_RESOLUTION, seat: TubePose | None = None
-) -> PointGrid:
-    """The grid of `Flow.volume`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
-    return volume_grid(robot, _margin(extent), resolution, seat)
-
-
 def _attributes(flow: Flow) -> dict[str, Any]:
     """Provenance of the flow, as attributes of a file."""
     motion = flow.prediction
@@ -360,23 +329,6 @@ def _attributes(flow: Flow) -> dict[str, Any]:
         "versions": versions(),
         "Conventions": "CF-1.11",
     }
-
-
-def _checked(points: Samples) -> Samples:
-    try:
-        coordinates = np.asarray(points, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError("points are no numbers; allowed: (n, 3), a row (x, y, z) in m for each point") from error
-    if coordinates.ndim != 2 or coordinates.shape[1] != 3:
-        raise InputError(f"points have shape {coordinates.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
-    if not np.all(np.isfinite(coordinates)):
-        first = int(np.argmin(np.all(np.isfinite(coordinates), axis=1)))
-        raise InputError(f"point {first} = {coordinates[first].tolist()} is not finite; allowed: coordinates in m")
-    return coordinates
-
-
-def _margin(extent: str | float | None) -> float | None:
-    return None if extent is None else parse_option("extent", extent, KINDS["length or zero"])
 
 
 def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any]:

@@ -66,8 +66,11 @@ def checked_points(points: Samples) -> Samples:
         xyz = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError("points are no numbers; allowed: rows (x, y, z) in m") from error
-    if xyz.ndim != 2 or xyz.shape[1] != 3 or not np.all(np.isfinite(xyz)):
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise InputError(f"points have shape {xyz.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
+    if not np.all(np.isfinite(xyz)):
+        first = int(np.argmin(np.all(np.isfinite(xyz), axis=1)))
+        raise InputError(f"point {first} = {xyz[first].tolist()} is not finite; allowed: coordinates in m")
     if np.any(np.abs(xyz) > _FARTHEST):
         raise InputError(f"points are farther away than {_FARTHEST:g} m; allowed: nearer ones")
     return np.ascontiguousarray(xyz)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError, check_range
+from spirillum.errors import InputError, check_choice, check_range
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import TubePose
-from spirillum.units import show
+from spirillum.units import KINDS, Kind, parse_option, show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 PLANES = {"xz": "y", "xy": "z", "yz": "x"}
 """Planes by the names of their axes, and the axis across each."""
+PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
+"""Points along the longest side of a plane and of a box."""
+_OFFSET = Kind("length", "m", "5 mm", "-100 m", "100 m")
 _AXES = "xyz"
 _MOST_POINTS = 2_000_000
 _LARGEST_RESOLUTION = 10_000
@@ -55,29 +58,40 @@ class PointGrid:
         return points
 
 
-def plane_grid(
-    robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: TubePose | None = None
+def plane_around(
+    robot: Robot,
+    plane: str = "xz",
+    offset: str | float = 0.0,
+    extent: str | float | None = None,
+    resolution: int = PLANE_RESOLUTION,
+    seat: TubePose | None = None,
 ) -> PointGrid:
-    """A grid on one of `PLANES`."""
-    box, across = _box(robot, margin, seat), PLANES[plane]
+    """The grid of `Flow.plane`; `seat` is the robot's pose in its tube, None in unbounded fluid."""
+    plane = "".join(sorted(str(plane)))
+    check_choice("plane", plane, PLANES)
+    at = parse_option("offset", offset, _OFFSET)
+    box, across = _box(robot, extent, seat), PLANES[plane]
     if seat is not None and across != "x":
         low, high = _glass(box["x"], seat, seat.radius)[across]
-        if not low < offset < high:
+        if not low < at < high:
             raise InputError(
-                f"offset = {show(offset, 'mm')} with plane = '{plane}': the plane is outside the tube; allowed: "
+                f"offset = {show(at, 'mm')} with plane = '{plane}': the plane is outside the tube; allowed: "
                 f"between {show(low, 'mm')} and {show(high, 'mm')}"
             )
     sides = {axis: side for axis, side in box.items() if axis in plane}
-    return _grid(sides, {across: np.array([offset])}, resolution, "resolution")
+    return _grid(sides, {across: np.array([at])}, resolution, "resolution")
 
 
-def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: TubePose | None = None) -> PointGrid:
-    """A grid in a box around the robot."""
-    return _grid(_box(robot, margin, seat), {}, resolution, "volume resolution")
+def box_around(
+    robot: Robot, extent: str | float | None = None, resolution: int = VOLUME_RESOLUTION, seat: TubePose | None = None
+) -> PointGrid:
+    """The grid of `Flow.volume`; `seat` as for `plane_around`."""
+    return _grid(_box(robot, extent, seat), {}, resolution, "volume resolution")
 
 
-def _box(robot: Robot, margin: float | None, seat: TubePose | None) -> dict[str, tuple[float, float]]:
-    """Both ends of the box along each axis, m."""
+def _box(robot: Robot, extent: str | float | None, seat: TubePose | None) -> dict[str, tuple[float, float]]:
+    """Both ends of the box along each axis, cut off a little outside of a tube's wall, m."""
+    margin = None if extent is None else parse_option("extent", extent, KINDS["length or zero"])
     wire = 0.5 * robot.tail.wire_diameter
     coupling = 0.5 * robot.coupling.diameter if robot.coupling.length > 0 else 0.0
     radius = max(0.5 * robot.body.diameter, coupling, robot.tail.amplitude + wire)
@@ -89,14 +103,11 @@ def _box(robot: Robot, margin: float | None, seat: TubePose | None) -> dict[str,
         "y": across,
         "z": across,
     }
-    return box if seat is None else _in_glass(box, seat, whole=margin is None)
-
-
-def _in_glass(box: dict[str, tuple[float, float]], seat: TubePose, *, whole: bool) -> dict[str, tuple[float, float]]:
-    """The box, cut off a little outside of a tube's wall."""
+    if seat is None:
+        return box
     reach = (1.0 + _GLASS) * seat.radius
     glass = _glass(box["x"], seat, reach)
-    if whole and reach < _WIDEST * box["y"][1]:
+    if margin is None and reach < _WIDEST * box["y"][1]:
         return {**box, **glass}
     return {**box, **{axis: (max(box[axis][0], low), min(box[axis][1], high)) for axis, (low, high) in glass.items()}}
 

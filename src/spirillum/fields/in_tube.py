@@ -284,18 +284,13 @@ def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float)
         count = int(0.6 * (orders + density.shape[1])) + 12
         count = round(count * around / np.pi)
         theta = around * (np.arange(count) + 0.5) / count
-        points = _ring_points(x[some], rho[some], theta)
+        across = rho[some] * np.cos(theta)[:, None], rho[some] * np.sin(theta)[:, None]
+        points = np.stack(np.broadcast_arrays(x[some], *across), axis=-1)
         weight = 2.0 * np.pi / count * gauss[some] * rho[some]
         acting = _ring_forces(weight[:, None, None] * modes[some], theta) @ seat.rotation.T
         if seat.yaw:  # a force is the sum of its even and its odd half, which cancel in its mirror image
             acting = np.repeat(acting.sum(axis=2, keepdims=True), 2, axis=2)
         yield _Sources.of(seat.placed(points.reshape(-1, 3)).reshape(points.shape), acting)
-
-
-def _ring_points(x: Samples, rho: Samples, theta: Samples) -> Samples:
-    """(angles, n, 3)."""
-    cos, sin = np.cos(theta)[:, None], np.sin(theta)[:, None]
-    return np.stack(np.broadcast_arrays(x, rho * cos, rho * sin), axis=-1)
 
 
 def _ring_forces(modes: Amplitudes, theta: Samples) -> Samples:
