@@ -216,7 +216,7 @@ def main() -> int:
     rows = [tuple(float(value) for value in row) for row in table[:kept]]
     if arguments.print:
         for row in rows:
-            print("        " + repr(row) + ",")
+            print(",".join(map(repr, row)))
     tails = [float(sum(abs(value) for value in column[kept:])) for column in zip(*table, strict=True)]
     print(f"coefficients kept: {kept} for each integral")
     print("sum of the dropped ones, of alpha A_1, alpha A_2, alpha A_3: " + ", ".join(f"{tail:.1e}" for tail in tails))

@@ -86,8 +86,8 @@ def test_tumbling_wobbling_and_step_out_of_a_tilted_moment(angle: float) -> None
         found, still = _settled(links, rate, attitude, 60.0)
         assert still
         expected = np.arcsin(min(1.0, tumbles / rate))
-        assert found.wobble == pytest.approx(expected, rel=1e-4)
-        assert found.rate == pytest.approx(rate, rel=1e-6)
+        assert found.wobble_angle == pytest.approx(expected, rel=1e-4)
+        assert found.tail_rotation_rate == pytest.approx(rate, rel=1e-6)
     assert not _settled(links, 1.03 * step_out, attitude, 60.0)[0].follows
 
 

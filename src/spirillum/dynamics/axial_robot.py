@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
+from spirillum.data_tables import rows_of
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.run_summary import STEADY, run_averages, stretches_on
 from spirillum.dynamics.timing import Switch, Timing
@@ -34,7 +35,7 @@ from spirillum.fitted.fit import read_fit
 from spirillum.kernels import motor as kernel
 from spirillum.kernels.motor import MOTOR, steady_currents, windings
 from spirillum.notes import Note, note_attributes
-from spirillum.quantities import attributes, unit_of
+from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -68,29 +69,7 @@ class AxialParameter(NamedTuple):
     """What it is, in half a sentence."""
 
 
-PARAMETERS = (
-    AxialParameter("motor.torque_constant", "N m/A", "K_m: torque in the joint per current, gear included"),
-    AxialParameter("motor.back_emf_constant", "V s/rad", "K_b: back-emf per rate of the joint, gear included"),
-    AxialParameter("motor.inductance", "H", "L"),
-    AxialParameter("motor.resistance.constant", "ohm", "R(I): constant part"),
-    AxialParameter("motor.resistance.decay", "ohm", "R(I): part that decays with the current"),
-    AxialParameter("motor.resistance.decay_rate", "1/A", "R(I): how fast it decays"),
-    AxialParameter("motor.resistance.growth", "ohm", "R(I): part that grows with the current"),
-    AxialParameter("motor.resistance.growth_rate", "1/A", "R(I): how fast it grows"),
-    AxialParameter("motor.resistance.slope", "ohm/A", "R(I): part in proportion to the current"),
-    AxialParameter("battery.voltage", "V", "V(I) without a current"),
-    AxialParameter("battery.internal_resistance", "ohm", "V(I): loss per current"),
-    AxialParameter("polarity", "1", "sense about +x in which the motor turns the tail: 1 or -1"),
-    *(
-        AxialParameter(f"{of}_per_{per}", unit_of(f"{of}_per_{per}"), f"{words} per {over}")
-        for per, over in (("torque", "joint torque"), ("flow", "imposed mean flow"))
-        for of, words in (
-            ("forward_velocity", "forward velocity"),
-            ("body_rotation_rate", "body rate"),
-            ("tail_rotation_rate", "tail rate"),
-        )
-    ),
-)
+PARAMETERS = tuple(AxialParameter(**row) for row in rows_of("dynamics/axial_parameters.csv"))
 """The numbers in the order of the compiled equations, which index them by column."""
 STATES = ("motor_current", "position", "tail_angle", "body_angle", "battery_charge_used")
 """The state; quantities of the registry. The compiled equations have two integrals of the current behind it."""

@@ -36,49 +36,9 @@ Json = dict[str, Any]
 _LATEST = 1e9  # latest time of a recording, s; seconds have 32 bits
 
 
-def _object(**fields: Json) -> Json:
-    return {"type": "object", "properties": fields}
-
-
-def _list(item: Json) -> Json:
-    return {"type": "array", "items": item}
-
-
-_NUMBER: Json = {"type": "number"}
-_WHOLE: Json = {"type": "integer"}
-_TEXT: Json = {"type": "string"}
-_TRUTH: Json = {"type": "boolean"}
-_TIME = _object(sec=_WHOLE, nsec=_WHOLE)
-_POINT = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_TURN = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _object(position=_POINT, orientation=_TURN)
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_TRIANGLES = _object(pose=_POSE, points=_list(_POINT), color=_COLOUR, colors=_list(_COLOUR), indices=_list(_WHOLE))
-_CYLINDER = _object(pose=_POSE, size=_POINT, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOUR)
-_NOTES = _list(_object(key=_TEXT, value=_TEXT))
-_ENTITY = _object(
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    id=_TEXT,
-    lifetime=_TIME,
-    frame_locked=_TRUTH,
-    metadata=_NOTES,
-    cylinders=_list(_CYLINDER),
-    triangles=_list(_TRIANGLES),
-)
-
-SCHEMAS: Mapping[str, Json] = {
-    "foxglove.FrameTransform": _object(
-        timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_POINT, rotation=_TURN
-    ),
-    "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
-    "foxglove.SceneUpdate": _object(deletions=_list(_object(timestamp=_TIME, id=_TEXT)), entities=_list(_ENTITY)),
-    "foxglove.CompressedImage": _object(
-        timestamp=_TIME, frame_id=_TEXT, data={**_TEXT, "contentEncoding": "base64"}, format=_TEXT
-    ),
-    "foxglove.Log": _object(timestamp=_TIME, level=_WHOLE, message=_TEXT, name=_TEXT, file=_TEXT, line=_WHOLE),
-}
+SCHEMAS: Mapping[str, Json] = json.loads((Path(__file__).parent / "foxglove.json").read_text(encoding="utf-8"))
 """JSON schemas by the names by which Foxglove knows them."""
+_TIME, _NUMBER = SCHEMAS["foxglove.Log"]["properties"]["timestamp"], {"type": "number"}
 
 
 def nanoseconds(time: float) -> int:
@@ -239,11 +199,10 @@ class _Writer:
 
         self._writer = Writer(stream)
         self._writer.start(library=f"{MARK} {own_version()}")
+        numbers = {name: {**_NUMBER, "description": text} for name, text in _meanings(dataset).items()}
         self._schemas = {
             **SCHEMAS,
-            _NUMBERS: _object(
-                timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in _meanings(dataset).items()}
-            ),
+            _NUMBERS: {"type": "object", "properties": {"timestamp": _TIME, **numbers}},
         }
         self._channels: dict[str, int] = {}
         names = ("robot", "model", "settings", "versions", "title")

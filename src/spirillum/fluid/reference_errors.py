@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.robot.batch import RobotBatch
 
 _WIRE, _LENGTH, _TAPER = 1.0, 60.0, 100.0  # mm, mm, c of the envelope
@@ -39,28 +40,12 @@ class TailError(NamedTuple):
     torque: float
 
 
-CHECKED: dict[str, dict[tuple[float, float], TailError]] = {
-    "rft": {
-        (25.0, 2.5): TailError(56, 22, -31),
-        (10.0, 1.5): TailError(168, 57, -36),
-        (15.0, 2.0): TailError(109, 43, -31),
-        (10.0, 3.5): TailError(271, 144, 12),
-    },
-    "sbt": {
-        (25.0, 2.5): TailError(-1.5, 8.7, -11),
-        (10.0, 1.5): TailError(-2.4, 2.2, -18),
-        (15.0, 2.0): TailError(-1.4, 5.3, -14),
-        (10.0, 3.5): TailError(1.9, 5.9, -6.7),
-    },
-    "slender": {
-        (25.0, 2.5): TailError(-0.56, -0.52, -0.76),
-        (10.0, 1.5): TailError(-1.3, 1.0, -1.0),
-        (15.0, 2.0): TailError(-0.81, -0.051, -0.88),
-        (10.0, 3.5): TailError(-0.77, 2.7, -1.0),
-    },
-}
+CHECKED: dict[str, dict[tuple[float, float], TailError]] = {}
 """Errors by model (`rft` with the printed coefficients, `slender` at standard accuracy) and by tail: wavelength and
 amplitude, mm."""
+for _row in rows_of("fluid/reference_errors.csv"):
+    _wavelength, _amplitude, *_errors = (float(_row[name]) for name in ("wavelength", "amplitude", *TailError._fields))
+    CHECKED.setdefault(_row["model"], {})[_wavelength, _amplitude] = TailError(*_errors)
 
 
 SPEED_ERRORS = {"rft": 21, "sbt": 31}

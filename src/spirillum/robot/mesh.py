@@ -8,11 +8,12 @@ to the tail's root, and an arm where the root does not lie on the axis.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.errors import InputError, check_memory
 from spirillum.robot.geometry import Centreline, StripeColour, centreline
 from spirillum.robot.links import outlines_of
@@ -23,27 +24,16 @@ from spirillum.units import show
 
 Colour = tuple[float, float, float]
 
-STRIPE_COLOURS: dict[StripeColour, Colour] = {
-    "red": (0.80, 0.11, 0.13),
-    "yellow": (0.97, 0.82, 0.13),
-    "green": (0.10, 0.55, 0.27),
-    "blue": (0.10, 0.28, 0.68),
-    "white": (0.95, 0.95, 0.95),
-    "black": (0.09, 0.09, 0.09),
-    "orange": (0.93, 0.48, 0.10),
-    "magenta": (0.78, 0.15, 0.54),
-    "cyan": (0.10, 0.64, 0.77),
-}
+
+def _colours(of: str) -> dict[Any, Colour]:
+    """Colours of stripes or of pieces by name."""
+    rows = (row for row in rows_of("robot/colours.csv") if row["of"] == of)
+    return {row["name"]: (float(row["red"]), float(row["green"]), float(row["blue"])) for row in rows}
+
+
+STRIPE_COLOURS: dict[StripeColour, Colour] = _colours("stripe")
 """sRGB of a stripe's colour names, 0 to 1."""
-COLOURS: dict[str, Colour] = {
-    "body": (0.82, 0.85, 0.89),
-    "seal": (0.91, 0.90, 0.86),
-    "shaft": (0.62, 0.64, 0.67),
-    "coupling": (0.74, 0.76, 0.79),
-    "stub": (0.72, 0.45, 0.20),
-    "arm": (0.72, 0.45, 0.20),
-    "tail": (0.72, 0.45, 0.20),
-}
+COLOURS: dict[str, Colour] = _colours("piece")
 """sRGB of the pieces, 0 to 1, the wire of copper; for pictures only."""
 _STEEL: Colour = (0.62, 0.64, 0.67)
 _WIRES = ("stub", "arm", "tail")

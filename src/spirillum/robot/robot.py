@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from pydantic import model_validator
 
+from spirillum.data_tables import rows_of
 from spirillum.files import MARK
 from spirillum.kernels.motor import CONSTANT, MOTOR, SLOPE, windings
 from spirillum.robot.batch import RobotBatch
@@ -131,20 +132,18 @@ class Robot(RobotTables):
         volumes = np.array([link.volume for link in links])
         volume = float(np.sum(volumes))
         found = {
-            "arc_fraction": Derived(alpha, "1", "alpha: axial over arc length of the tail"),
-            "pitch_angle": Derived(float(np.arccos(alpha)), "rad", "angle between wire and tail axis"),
-            "turns": Derived(tail.length / tail.wavelength, "1", "number of turns of the tail"),
-            "arc_length": Derived(arc, "m", "arc length of the wire (plain helix)"),
-            "robot_length": Derived(
-                self.body.length + self.coupling.length + tail.length, "m", "body, coupling and tail together"
-            ),
-            "body_volume": Derived(links.body.volume, "m^3", "volume of the body"),
-            "coupling_volume": Derived(coupling, "m^3", "volume of the coupling's solid"),
-            "wire_volume": Derived(solids["tail"].volume, "m^3", "volume of the wire, its bend at the root included"),
-            "displaced_volume": Derived(volume, "m^3", "volume of body, coupling and wire"),
+            "arc_fraction": alpha,
+            "pitch_angle": float(np.arccos(alpha)),
+            "turns": tail.length / tail.wavelength,
+            "arc_length": arc,
+            "robot_length": self.body.length + self.coupling.length + tail.length,
+            "body_volume": links.body.volume,
+            "coupling_volume": coupling,
+            "wire_volume": solids["tail"].volume,
+            "displaced_volume": volume,
         }
         if (self.body.mass is None and (self.has_body or coupling)) or tail.density is None:
-            return found
+            return _described(found)
         masses = np.array([link.mass for link in links])
         mass = float(np.sum(masses))
         centre = masses @ np.array([link.centre[0] for link in links]) / mass
@@ -152,20 +151,28 @@ class Robot(RobotTables):
         if self.body.center_of_mass is not None:
             assumed = "with body.center_of_mass"
         buoyancy = volumes @ np.array([link.centroid[0] for link in links]) / volume
-        return found | {
-            "tail_mass": Derived(tail.density * solids["tail"].volume, "kg", "mass of the wire"),
-            "mass": Derived(mass, "kg", "mass of the robot"),
-            "submerged_weight": Derived(
-                (mass - self.fluid.density * volume) * STANDARD_GRAVITY, "N", "weight less buoyancy"
-            ),
-            "weight_uncertainty": Derived(
-                0.01 * float(np.hypot(mass, self.fluid.density * volume)) * STANDARD_GRAVITY,
-                "N",
-                "of submerged_weight, a small difference, where mass and volume are each known to 1 %",
-            ),
-            "centre_of_mass": Derived(float(centre), "m", f"x of the centre of mass ({assumed})"),
-            "centre_of_buoyancy": Derived(float(buoyancy), "m", "x of the centre of buoyancy"),
+        displaced = self.fluid.density * volume
+        found |= {
+            "tail_mass": tail.density * solids["tail"].volume,
+            "mass": mass,
+            "submerged_weight": (mass - displaced) * STANDARD_GRAVITY,
+            "weight_uncertainty": 0.01 * float(np.hypot(mass, displaced)) * STANDARD_GRAVITY,
+            "centre_of_mass": float(centre),
+            "centre_of_buoyancy": float(buoyancy),
         }
+        return _described(found, assumed)
+
+
+_DERIVED = {row["name"]: row for row in rows_of("robot/derived.csv")}
+"""Units and meanings of what follows from a robot's fields."""
+
+
+def _described(values: dict[str, float], assumed: str = "") -> dict[str, Derived]:
+    """Derived quantities with units and meanings."""
+    rows = {name: _DERIVED[name] for name in values}
+    return {
+        name: Derived(values[name], row["unit"], row["meaning"].format(assumed=assumed)) for name, row in rows.items()
+    }
 
 
 def robot_text(robot: Robot, comment: str = "") -> str:
