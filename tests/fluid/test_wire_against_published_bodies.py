@@ -240,12 +240,9 @@ def test_distance_from_the_centreline() -> None:
 @pytest.mark.parametrize(
     ("curve", "radius", "said"),
     [
-        (np.zeros((2, 3)), 0.1, "curve has shape (2, 3); allowed: at least 4 finite points"),
-        (np.full((9, 3), np.nan), 0.1, "allowed: at least 4 finite points"),
-        (straight(1.0), 0.0, "radius = 0.0; allowed: a finite number above 0"),
         (helix(0.5, 1.0, 3.0), 0.3, "the wire comes within 500 mm of another part of its centreline"),
     ],
-    ids=["short", "nan", "thin", "touching"],
+    ids=["touching"],
 )
 def test_no_wire(curve: np.ndarray, radius: float, said: str) -> None:
     with pytest.raises(InputError) as caught:

@@ -13,6 +13,12 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Vector
 _AXIAL_BOTH = np.array([0, 3, 6, 9])
 
 
+def dyad(vector: Vectors, other: Vectors | None = None) -> Tensors:
+    """The dyadic product of two vectors, or of one with itself, 3x3."""
+    product: Tensors = vector[..., :, None] * (vector if other is None else other)[..., None, :]
+    return product
+
+
 def skew(vector: Vectors) -> Tensors:
     """S of eq. (12): the matrix with S v = p x v."""
     x, y, z = np.moveaxis(np.asarray(vector), -1, 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,21 +21,15 @@ class Segment:
 
     start: tuple[float, float]
     end: tuple[float, float]
+    turn: ClassVar[float] = 0.0
+    """Angle by which its tangent turns, rad."""
+    edges: ClassVar[tuple[float, ...]] = (0.0, 1.0)
+    """Parameters between which it is analytic."""
 
     def points(self, t: Samples) -> tuple[Samples, Samples]:
         """(x, rho) at t from 0 to 1."""
         (x_a, rho_a), (x_b, rho_b) = self.start, self.end
         return x_a + (x_b - x_a) * t, rho_a + (rho_b - rho_a) * t
-
-    @property
-    def turn(self) -> float:
-        """Angle by which its tangent turns, rad."""
-        return 0.0
-
-    @property
-    def edges(self) -> tuple[float, ...]:
-        """Parameters between which it is analytic."""
-        return 0.0, 1.0
 
     def slope(self, t: Samples) -> Samples:
         """dx/dt."""
@@ -62,6 +56,8 @@ class Arc:
     centre: tuple[float, float]
     semi_axes: tuple[float, float]
     angles: tuple[float, float]
+    edges: ClassVar[tuple[float, ...]] = (0.0, 1.0)
+    """Parameters between which it is analytic."""
 
     def points(self, t: Samples) -> tuple[Samples, Samples]:
         """(x, rho) at t from 0 to 1."""
@@ -75,11 +71,6 @@ class Arc:
     def turn(self) -> float:
         """Angle by which its tangent turns, rad."""
         return abs(self.angles[1] - self.angles[0])
-
-    @property
-    def edges(self) -> tuple[float, ...]:
-        """Parameters between which it is analytic."""
-        return 0.0, 1.0
 
     def slope(self, t: Samples) -> Samples:
         """dx/dt."""

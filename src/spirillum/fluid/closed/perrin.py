@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Matrix6, PerRobot
-from spirillum.errors import InputError
 from spirillum.fluid.model import ResistanceModel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
@@ -100,6 +99,5 @@ class Perrin(ResistanceModel):
 
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
         """See `ResistanceModel.part_matrix`."""
-        if part != "body":
-            raise InputError(f"part = {part!r} with model 'perrin'; allowed: body (Perrin's formulas know no tail)")
+        self.check_part(batch, part)
         return body_matrix(batch)

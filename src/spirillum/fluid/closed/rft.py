@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values, Vectors
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values
 from spirillum.envelope import quantity
-from spirillum.errors import InputError
-from spirillum.fluid.algebra import both_parts, joint_locked, skew, two_parts_axial
+from spirillum.fluid.algebra import both_parts, dyad, joint_locked, skew, two_parts_axial
 from spirillum.fluid.closed.perrin import body_axial, body_matrix
 from spirillum.fluid.closed.thin_wire import thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
@@ -160,16 +159,16 @@ def _wire_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
     ds = weight * columns["length"] * (line.stretch if _has_true_arc(b) else 1.0 / b.arc_fraction[:, None])
     c = local_coefficients(batch)
     normal, tangential = c.normal[:, None, None, None], c.tangential[:, None, None, None]
-    local: Tensors = normal * np.eye(3) + (tangential - normal) * _outer(line.tangent)
+    local: Tensors = normal * np.eye(3) + (tangential - normal) * dyad(line.tangent)
     if c.floor_normal is not None:
         up = np.array([0.0, 0.0, 1.0]) - line.tangent[..., 2:] * line.tangent
         across = up / np.linalg.norm(up, axis=-1, keepdims=True)
-        local = local + (c.floor_normal[:, None, None, None] - normal) * _outer(across)
+        local = local + (c.floor_normal[:, None, None, None] - normal) * dyad(across)
     arm = skew(line.position)
     upper = np.concatenate([local, -local @ arm], axis=-1)
     lower = arm @ upper
     if b.options.rft.spin:
-        lower[..., 3:] += _spin_coefficient(b)[:, None, None, None] * _outer(line.tangent)
+        lower[..., 3:] += _spin_coefficient(b)[:, None, None, None] * dyad(line.tangent)
     total: Matrix6 = np.einsum("...i,...ijk->...jk", ds, np.concatenate([upper, lower], axis=-2))
     return total
 
@@ -191,10 +190,6 @@ def _along_the_wire(batch: RobotBatch) -> tuple[Values, Values]:
     node, weight = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
     half = 0.5 * np.diff(edges)[:, None]
     return (edges[:-1, None] + half * (1.0 + node)).ravel(), (half * weight).ravel()
-
-
-def _outer(vector: Vectors) -> Tensors:
-    return vector[..., :, None] * vector[..., None, :]
 
 
 def _spin_coefficient(batch: RobotBatch) -> PerRobot:
@@ -342,10 +337,7 @@ class Rft(SwimmerModel):
 
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
         """See `ResistanceModel.part_matrix`; the rotor is the tail, since RFT leaves the coupling out."""
+        self.check_part(batch, part)
         if part == "body":
             return body_matrix(batch)
-        if part in ("tail", "rotor"):
-            return tail_matrix(batch, phase)
-        if part == "robot":
-            return joint_locked(self.resistance(batch, phase))
-        raise InputError(f"part = {part!r} with model 'rft'; allowed: {', '.join(self.parts)} (it has no coupling)")
+        return joint_locked(self.resistance(batch, phase)) if part == "robot" else tail_matrix(batch, phase)

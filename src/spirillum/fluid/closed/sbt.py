@@ -18,7 +18,6 @@ import numpy as np
 
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples, Values
 from spirillum.data_tables import rows_of
-from spirillum.errors import InputError
 from spirillum.fluid.algebra import two_parts_axial
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT, cutoff, thin_wire_cautions
@@ -191,8 +190,7 @@ class Sbt(SwimmerModel):
 
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
         """See `ResistanceModel.part_matrix`; all but the axial entries are NaN."""
-        if part not in self.parts:
-            raise InputError(f"part = {part!r} with model 'sbt'; allowed: {', '.join(self.parts)} (it has no coupling)")
+        self.check_part(batch, part)
         drag, rotation = body_axial(batch)
         body = (drag, np.zeros(1), rotation)
         tail = tail_axial(batch)

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.algebra import axis_rotation
+from spirillum.fluid.algebra import axis_rotation, dyad
 from spirillum.fluid.tube.reduced import Answers, Reduced
 from spirillum.fluid.tube.solids import MOTIONS, Solids
 from spirillum.fluid.tube.wall import point_reflection
-from spirillum.fluid.wire.interaction import one_thread
+from spirillum.fluid.wire.interaction import asymmetry_of, one_thread, solve_wires
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
 from spirillum.robot.tube_pose import TubePose
@@ -86,9 +86,7 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
 
 
 def _wires_alone(link: _Link) -> Held:
-    from scipy.linalg import cho_factor, cho_solve
-
-    strengths = cho_solve(cho_factor(link.mobility, lower=True, check_finite=False), link.motion, check_finite=False)
+    strengths = solve_wires(link.mobility, link.motion)
     matrix = link.motion.T @ strengths
     matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
     forces = strengths[: sum(line.points.size for line in link.wires)]
@@ -109,11 +107,7 @@ def _held(full: Samples, strengths: Strengths) -> Held:
     turn = turned_motions()
     full = turn @ full @ turn.T
     matrix, load = full[:-1, :-1], 0.5 * (full[:-1, -1] + full[-1, :-1])
-    there = np.diag(matrix) > 0
-    scale = np.sqrt(np.diag(matrix)[there])
-    lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale, scale)
-    asymmetry = float(np.max(np.abs(lack), initial=0.0))
-    return Held(0.5 * (matrix + matrix.T), load, float(full[-1, -1]), asymmetry, strengths)
+    return Held(0.5 * (matrix + matrix.T), load, float(full[-1, -1]), asymmetry_of(matrix), strengths)
 
 
 @dataclass(frozen=True)
@@ -205,7 +199,7 @@ def _near_wall(wire: Wire, pose: TubePose) -> Samples:
     normal = outward - np.sum(outward * tangents, axis=1, keepdims=True) * tangents
     missing = np.arccosh(ratio) - np.log(2.0 * ratio)
     film = 1.0 - np.sqrt(1.0 - ratio**-2)
-    local = missing[:, None, None] * (np.eye(3) + _dyads(tangents)) + film[:, None, None] * _dyads(normal)
+    local = missing[:, None, None] * (np.eye(3) + dyad(tangents)) + film[:, None, None] * dyad(normal)
     local = 2.0 * pose.rotation.T @ local @ pose.rotation
     apart = np.linalg.norm(wire.points[:, None] - wire.points, axis=-1)
     width = 0.5 * (height[:, None] + height)
@@ -213,11 +207,6 @@ def _near_wall(wire: Wire, pose: TubePose) -> Samples:
     both = 0.5 * spread[:, :, None, None] * (local[:, None] + local)
     matrix: Samples = both.swapaxes(1, 2).reshape(3 * len(placed), -1)
     return matrix
-
-
-def _dyads(vectors: Samples) -> Samples:
-    products: Samples = vectors[:, :, None] * vectors[:, None, :]
-    return products
 
 
 def _turned(wire: Wire) -> Wire:

@@ -21,7 +21,7 @@ from spirillum.errors import check_memory
 from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
 from spirillum.fluid.tube.wall import CROWD, SLACK, WallWaves, each, waves_between
-from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
+from spirillum.fluid.wire.interaction import longest_panels, one_thread, share, surface_motion
 from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline, Segment
@@ -310,22 +310,15 @@ def _longest(
     solids: Sequence[tuple[Outline, int]], pose: TubePose, fineness: Fineness, lines: Samples
 ) -> Callable[[int, Samples, Samples], Samples]:
     """Longest panels allowed at (x, rho): close to other solids, the film at the wall, and wires."""
+    unbounded = longest_panels(solids, lines)
 
     def longest(solid: int, x: Samples, rho: Samples) -> Samples:
-        found: Samples = np.full(np.shape(x), np.inf)
-        for other, (outline, _) in enumerate(solids):
-            if other != solid:
-                found = np.minimum(found, 2.0 * outline.distance(x, rho))
         film = np.maximum(pose.distances(x, rho), 0.0)
         varies = fineness.panel * np.sqrt(2.0 * film * np.maximum(rho, film))
         if pose.level and fineness.growth:
             sides = [p for p in solids[solid][0].pieces if isinstance(p, Segment) and p.start[1] == p.end[1]]
             apart = [np.minimum(x - min(p.start[0], p.end[0]), max(p.start[0], p.end[0]) - x) for p in sides]
             varies += fineness.growth * np.max(apart, axis=0, initial=0.0)
-        found = np.minimum(found, varies)
-        if len(lines):
-            near = np.min(np.hypot(x[:, None] - lines[:, 0], rho[:, None] - lines[:, 1]), axis=1)
-            found = np.minimum(found, 4.0 * np.hypot(near, lines[:, 2].min()))
-        return found
+        return np.asarray(np.minimum(unbounded(solid, x, rho), varies))
 
     return longest

@@ -86,16 +86,11 @@ def _solids(key: _SolidKey) -> Solids:
 
 
 @lru_cache(maxsize=4096)
-def _size(key: _SolidKey) -> int:
-    """Number of unknowns of one parity."""
-    return Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3)).size
-
-
-@lru_cache(maxsize=4096)
-def _waves(key: _SolidKey) -> int:
-    """Number of waves between solids and wall."""
+def _size(key: _SolidKey) -> tuple[int, int]:
+    """Number of unknowns of one parity, and of waves between solids and wall; of these 0 with too many unknowns."""
     solids = Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3))
-    return 0 if solids.none else sum(solids.waves(solids.gap).orders)
+    few = not solids.none and solids.size <= _MOST_UNKNOWNS
+    return solids.size, sum(solids.waves(solids.gap).orders) if few else 0
 
 
 @lru_cache(maxsize=4096)
@@ -258,11 +253,9 @@ class Tube(SwimmerModel):
         for index in within(batch, limits):
             g, pose = RobotGeometry.of(batch, index), pose_of(batch, index)
             key = _solid_key(g, part, pose, self.fineness(batch, index))
-            unknowns[index] = _size(key)
-            if unknowns[index] <= _MOST_UNKNOWNS:
-                waves[index] = _waves(key)
-                if waves[index] <= _MOST_WAVES:
-                    memory[index] = _memory(key) / 2**30
+            unknowns[index], waves[index] = _size(key)
+            if unknowns[index] <= _MOST_UNKNOWNS and waves[index] <= _MOST_WAVES:
+                memory[index] = _memory(key) / 2**30
         gibibytes = "GiB of memory", memory, MOST_MEMORY / 2**30
         asked = (("unknowns", unknowns, _MOST_UNKNOWNS), ("waves", waves, _MOST_WAVES), gibibytes)
         return limits + [Limit.named("solvable", count, float(most), what=what) for what, count, most in asked]

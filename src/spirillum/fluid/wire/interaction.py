@@ -93,17 +93,19 @@ def _solve(
     points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
     system = wire_system(wires, resolution.wire)
     if not solids:
-        strengths = _solved(system.mobility, system.motion)
+        strengths = solve_wires(system.mobility, system.motion)
         matrix = system.motion.T @ strengths + system.own
         return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), strengths, system)
-    panels = panels_of([outline for outline, _ in solids], _longest(solids, points, lines), resolution.order)
+    blobs = np.concatenate([np.full(len(wire.points), wire.blob) for wire in lines]) if lines else np.zeros(0)
+    near = np.stack([points[:, 0], np.hypot(points[:, 1], points[:, 2]), blobs], axis=1)
+    panels = panels_of([outline for outline, _ in solids], longest_panels(solids, near), resolution.order)
     images = _Images.of(panels, np.array([part for _, part in solids]), lines, system, resolution)
-    strengths = _solved(system.mobility - images.mobility, system.motion - images.drift)
+    strengths = solve_wires(system.mobility - images.mobility, system.motion - images.drift)
     matrix = images.resistance + (system.motion - images.drag).T @ strengths + system.own
     return _solution(matrix, panels, lines, images.densities(strengths), strengths, system)
 
 
-def _solved(mobility: Samples, motion: Samples) -> Samples:
+def solve_wires(mobility: Samples, motion: Samples) -> Samples:
     """Forces and moments from velocities, by Cholesky factors: the matrix is symmetric positive definite."""
     from scipy.linalg import cho_factor, cho_solve
 
@@ -122,14 +124,11 @@ def _solution(
     system: WireSystem,
 ) -> UnitTwistSolution:
     matrix = _EIGHT_PI * matrix
-    scale = np.sqrt(np.diag(matrix))
-    there = scale > 0
-    lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale[there], scale[there])
     stations, kinds = system.moments.shape[:2]
     amounts = strengths[3 * stations :].reshape(stations, kinds, 12)
     return UnitTwistSolution(
         matrix=0.5 * (matrix + matrix.T),
-        asymmetry=float(np.max(np.abs(lack))),
+        asymmetry=asymmetry_of(matrix),
         panels=panels,
         wires=wires,
         densities=_EIGHT_PI * densities,
@@ -138,21 +137,25 @@ def _solution(
     )
 
 
-def _longest(
-    solids: Sequence[tuple[Outline, int]], points: Samples, wires: tuple[Wire, ...]
-) -> Callable[[int, Samples, Samples], Samples]:
-    """Longest panels allowed on each solid at (x, rho): against the gap to other solids, and to the wires."""
-    blob = min((wire.blob for wire in wires), default=np.inf)
-    line_x, line_rho = points[:, 0], np.hypot(points[:, 1], points[:, 2])
+def asymmetry_of(matrix: Samples) -> float:
+    """Deviation from symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
+    there = np.diag(matrix) > 0
+    scale = np.sqrt(np.diag(matrix)[there])
+    lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale, scale)
+    return float(np.max(np.abs(lack), initial=0.0))
+
+
+def longest_panels(solids: Sequence[tuple[Outline, int]], lines: Samples) -> Callable[[int, Samples, Samples], Samples]:
+    """Longest panels allowed on each solid at (x, rho): against the gap to others, and to wires (x, rho, blob)."""
 
     def longest(solid: int, x: Samples, rho: Samples) -> Samples:
         found = np.full(np.shape(x), np.inf)
         for other, (outline, _) in enumerate(solids):
             if other != solid:
                 found = np.minimum(found, 2.0 * outline.distance(x, rho))
-        if len(points):
-            near = np.min(np.hypot(x[:, None] - line_x, rho[:, None] - line_rho), axis=1)
-            found = np.minimum(found, 4.0 * np.hypot(near, blob))
+        if len(lines):
+            near = np.min(np.hypot(x[:, None] - lines[:, 0], rho[:, None] - lines[:, 1]), axis=1)
+            found = np.minimum(found, 4.0 * np.hypot(near, lines[:, 2].min()))
         return found
 
     return longest

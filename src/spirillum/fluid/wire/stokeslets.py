@@ -20,7 +20,7 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
-from spirillum.fluid.algebra import skew
+from spirillum.fluid.algebra import dyad, skew
 
 Accuracy = Literal["standard", "high"]
 
@@ -31,8 +31,6 @@ _SPACING = 0.75
 _INSET = 0.375
 """Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
 solved for with their edges, then have the right drag along and across to 0.4 %."""
-_MOST_STATIONS = 6000
-_FARTHEST = 1e9
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
 _TILT = 0.5
 """Torque of a tilting cross-section over that of a spinning one; see `_own_torque`."""
@@ -76,8 +74,7 @@ def station_count(arc_length: PerRobot, radius: PerRobot) -> PerRobot:
 
 def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: bool = False) -> Wire:
     """The wire of radius a along points of a centreline, dense against its bends; a closed one ends where it starts."""
-    line = _checked(curve, radius, spacing, closed=closed)
-    wire = stations_along(line, float(radius), float(spacing), closed=closed)
+    wire = stations_along(curve, radius, spacing, closed=closed)
     near = closest_approach(wire, closed=closed)
     if near < 2.0 * wire.radius:
         raise InputError(
@@ -85,33 +82,6 @@ def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: b
             f"diameter, {2e3 * wire.radius:.3g} mm"
         )
     return wire
-
-
-def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> Samples:
-    """The curve as numbers that make a wire."""
-    try:
-        line = np.asarray(curve, dtype=float)
-        sizes = float(radius), float(spacing)
-    except (TypeError, ValueError) as error:
-        raise InputError("curve, radius or spacing is no number; allowed: points (x, y, z) and lengths in m") from error
-    if line.ndim != 2 or line.shape[1] != 3 or len(line) < 4 or not np.all(np.isfinite(line)):
-        raise InputError(f"curve has shape {line.shape}; allowed: at least 4 finite points (x, y, z) in m")
-    for name, value in zip(("radius", "spacing"), sizes, strict=True):
-        if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{name} = {value}; allowed: a finite number above 0")
-    if np.max(np.abs(line)) > _FARTHEST or np.ptp(line, axis=0).max() < 1.0 / _FARTHEST:
-        raise InputError(f"curve spans {np.ptp(line, axis=0).max():.3g} m; allowed: 1/{_FARTHEST:g} to {_FARTHEST:g} m")
-    length = float(np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    if closed and np.linalg.norm(line[-1] - line[0]) > 1e-9 * length:
-        raise InputError("curve with closed = True ends elsewhere than it starts; allowed: the same point")
-    if closed and length < 2.0 * np.pi * sizes[0]:
-        raise InputError(
-            f"radius = {sizes[0]:.3g} m is larger than a ring of length {length:.3g} m; allowed: a thinner wire"
-        )
-    count = float(station_count(np.array([length]), np.array([sizes[0]]))[0]) / sizes[1]
-    if count > _MOST_STATIONS:
-        raise InputError(f"radius = {sizes[0]:.3g} m makes {count:.0f} stations; allowed: at most {_MOST_STATIONS}")
-    return line
 
 
 def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
@@ -256,11 +226,11 @@ def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple
     second = np.cross(tangents, first)
     moments: Samples = np.stack(
         [
-            np.sqrt(0.5) * (_dyad(second, first) - _dyad(first, second)),
-            _dyad(tangents, first),
-            _dyad(tangents, second),
-            np.sqrt(0.5) * (_dyad(first, first) - _dyad(second, second)),
-            np.sqrt(0.5) * (_dyad(first, second) + _dyad(second, first)),
+            np.sqrt(0.5) * (dyad(second, first) - dyad(first, second)),
+            dyad(tangents, first),
+            dyad(tangents, second),
+            np.sqrt(0.5) * (dyad(first, first) - dyad(second, second)),
+            np.sqrt(0.5) * (dyad(first, second) + dyad(second, first)),
         ],
         axis=1,
     )
@@ -273,8 +243,3 @@ def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple
     missing = ((1.0 / a2 - 2.0 / e2) / lengths)[:, None] * np.array([4.0, 4.0, 4.0, 2.0, 2.0])
     gradients[np.diag_indices_from(gradients)] += missing.ravel()
     return moments, across, gradients
-
-
-def _dyad(force: Samples, displacement: Samples) -> Samples:
-    product: Samples = force[:, :, None] * displacement[:, None, :]
-    return product
