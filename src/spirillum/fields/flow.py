@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity, with_notes_last
 from spirillum.errors import InputError, check_choice, did_you_mean
-from spirillum.fields.fluid_field import FluidField, flow_field
+from spirillum.fields.fluid_field import FluidField, checked_points, flow_field
 from spirillum.fields.grid import (
     PLANE_RESOLUTION,
     VOLUME_RESOLUTION,
@@ -129,7 +129,7 @@ class Flow(DisplayMixin):
         Raises:
             InputError: if they have another shape or are not finite.
         """
-        return np.asarray(self.field.inside(points), dtype=bool)
+        return np.asarray(self.field.inside(checked_points(points)), dtype=bool)
 
     def velocity(self, points: Samples) -> Samples:
         """Velocity of the fluid in the chosen frame, m/s, (n, 3); arguments as for `fields`."""
@@ -149,7 +149,7 @@ class Flow(DisplayMixin):
             InputError: if one of them lies inside a solid or outside the tube (the sentence names point and part), is
                 not finite, or has another shape.
         """
-        velocity, pressure = self.field.fields(points)
+        velocity, pressure = self.field.fields(checked_points(points))
         if self.frame == "body":
             velocity = velocity - self.prediction.forward_velocity * self.heading
         return velocity, pressure

@@ -245,7 +245,8 @@ def refused_table(problems: Sequence[str], source: str = "") -> InputError:
 def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -> Iterable[str]:
     """Our sentences for one of pydantic's findings."""
     kind, context = problem["type"], problem.get("ctx", {})
-    names = [str(name) for name in problem["loc"] if name != "[key]"]
+    names = [str(name) for name in problem["loc"]]
+    names = names[:-1] if names[1:] and names[-1] == "[key]" else names  # of a name in a table by name
     if kind == "assembly":
         return str(context["sentences"]).split("\n")
     field = ".".join([under, *names] if under else names)[:_LONGEST_FIELD]
