@@ -6,9 +6,11 @@ of figures and the documentation read it from here.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from spirillum.data_tables import rows_of
+from spirillum.envelope import quantity
 from spirillum.units import for_people
 
 
@@ -34,6 +36,11 @@ QUANTITIES = {row["name"]: Quantity(**row) for row in rows_of("quantities.csv")}
 def unit_of(name: str) -> str:
     """SI unit of a quantity."""
     return QUANTITIES[name].unit
+
+
+def in_units(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Quantities of the registry by name, as an answer has them."""
+    return {name: quantity(value, unit_of(name)) for name, value in values.items()}
 
 
 def attributes(name: str, *, meaning: str | None = None, source: str | None = None) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel
@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf
-from spirillum.robot.fields import problems_in, refused_table
+from spirillum.robot.fields import all_metadata, problems_in, refused_table, section_in
 from spirillum.robot.robot import Robot
 from spirillum.units import Kind, show
 
@@ -91,47 +91,25 @@ def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, A
     found: dict[str, Any] = {}
     for name, value in table.items():
         info = model.model_fields.get(name)
-        if value is None and info is not None:
-            if info.default is not None:
-                found[name] = "none"
-            continue
         if info is None:
             found[name] = value
-            continue
-        kinds = [item for item in info.metadata if isinstance(item, Kind)]
-        for part in get_args(info.annotation):
-            kinds += [item for item in getattr(part, "__metadata__", ()) if isinstance(item, Kind)]
-        unit = kinds[0].unit if kinds else None
-        section = _section(info.annotation)
-        if unit is not None and isinstance(value, float | int) and not isinstance(value, bool):
-            found[name] = f"{value!r} {unit}"
-        elif section is not None and isinstance(value, Mapping):
-            if name in _BY_NAME:
-                found[name] = {
-                    key: _with_units(section, item) if isinstance(item, Mapping) else item
-                    for key, item in value.items()
-                }
-            else:
-                found[name] = _with_units(section, value)
+        elif value is None:
+            found |= {name: "none"} if info.default is not None else {}
+        elif isinstance(value, Mapping) and (section := section_in(info.annotation)) is not None:
+            tables = value if name in _BY_NAME else {name: value}
+            read = {
+                key: _with_units(section, item) if isinstance(item, Mapping) else item for key, item in tables.items()
+            }
+            found[name] = read if name in _BY_NAME else read[name]
         else:
-            found[name] = value
+            kinds = [item for item in all_metadata(info) if isinstance(item, Kind)]
+            number = bool(kinds) and isinstance(value, float | int) and not isinstance(value, bool)
+            found[name] = f"{value!r} {kinds[0].unit}" if number else value
     return found
 
 
 _BY_NAME = ("calibration",)
 """Fields that hold sections by names of the user's."""
-
-
-def _section(annotation: Any) -> type[BaseModel] | None:
-    """The section class inside an annotation such as ``Motor | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for part in get_args(annotation):
-        if (found := _section(part)) is not None:
-            return found
-    return None
-
-
 _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
 

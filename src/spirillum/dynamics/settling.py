@@ -33,6 +33,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.notes import Note
+from spirillum.quantities import in_units
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import IN_CHANNEL
@@ -145,7 +146,8 @@ class Settling(DisplayMixin):
         """Azimuth, pitch and yaw (rad), and speed (m/s) and body rate (rad/s) over a turn, as it passes `until`."""
         moment, time = self.drainage_time, self.way("time")
         half = 0.5 * self._free.run.turn.time
-        found = {name: float(np.interp(moment, time, self.way(name))) for name in ("azimuth", "pitch", "yaw")}
+        names = {"azimuth": "azimuth", "wall_pitch": "pitch", "wall_yaw": "yaw"}
+        found = {name: float(np.interp(moment, time, self.way(way))) for name, way in names.items()}
         ends = np.clip([moment - half, moment + half], time[0], time[-1])
         for name, way in (("forward_velocity", "x"), ("body_rotation_rate", "roll")):
             found[name] = float(np.diff(np.interp(ends, time, self.way(way)))[0] / np.diff(ends)[0])
@@ -169,43 +171,32 @@ class Settling(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum settle --json`."""
-        motion, passing = self.prediction, self.passing
-        time = self.way("time")
-        shown = np.unique(np.linspace(0, time.size - 1, min(_SAMPLES, time.size)).astype(int))
+        motion, count = self.prediction, self.way("time").size
+        shown = np.unique(np.linspace(0, count - 1, min(_SAMPLES, count)).astype(int))
+        moving = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
+        names = {name: name for name in ("time", "gap", "azimuth")} | {"wall_pitch": "pitch", "wall_yaw": "yaw"}
+        names |= {"contact_force": "contact_force"}
+        films = {name: [getattr(film, name) for film in self.films] for name in LubricationFilm._fields}
         content = {
             "robot": self.robot.name,
             "model": motion.model.name,
             "model_reason": IN_CHANNEL,
-            "forward_velocity": quantity(motion.forward_velocity, "m/s"),
-            "tail_rotation_rate": quantity(motion.tail_rotation_rate, "rad/s"),
-            "body_rotation_rate": quantity(motion.body_rotation_rate, "rad/s"),
+            **in_units({name: getattr(motion, name) for name in moving}),
             "submerged_weight": quantity(self.weight, "N", uncertainty=self.weight_uncertainty),
-            "roughness": quantity(self.roughness, "m"),
-            "friction_coefficient": quantity(self.friction_coefficient, "1"),
+            **in_units({"roughness": self.roughness, "friction_coefficient": self.friction_coefficient}),
             "state": state_of(self.lying, self.warnings),
             "lying": self.lying.to_dict(),
             "drainage_time": quantity(self.drainage_time, "s", until=quantity(self.until, "m")),
-            "passing": {
-                "azimuth": quantity(passing["azimuth"], "rad"),
-                "wall_pitch": quantity(passing["pitch"], "rad"),
-                "wall_yaw": quantity(passing["yaw"], "rad"),
-                "forward_velocity": quantity(passing["forward_velocity"], "m/s"),
-                "body_rotation_rate": quantity(passing["body_rotation_rate"], "rad/s"),
-            },
-            "way": {
-                "time": quantity(time[shown], "s"),
-                "gap": quantity(self.way("gap")[shown], "m"),
-                "azimuth": quantity(self.way("azimuth")[shown], "rad"),
-                "wall_pitch": quantity(self.way("pitch")[shown], "rad"),
-                "wall_yaw": quantity(self.way("yaw")[shown], "rad"),
-                "contact_force": quantity(self.way("contact_force")[shown], "N"),
-            },
-            "film": {
-                "gap": quantity([f.gap for f in self.films], "m"),
-                "normal_resistance": quantity([f.normal_resistance for f in self.films], "N s/m"),
-                "over_lubrication": quantity(self.lubrication_ratios, "1"),
-                "sideways_force": quantity([f.sideways_force for f in self.films], "N"),
-            },
+            "passing": in_units(self.passing),
+            "way": in_units({name: self.way(way)[shown] for name, way in names.items()}),
+            "film": in_units(
+                {
+                    "gap": films["gap"],
+                    "normal_resistance": films["normal_resistance"],
+                    "over_lubrication": self.lubrication_ratios,
+                    "sideways_force": films["sideways_force"],
+                }
+            ),
             "placement": motion.placement,
             "error_estimate": motion.to_dict()["error_estimate"],
             "references": list(motion.references),

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from spirillum.arrays import Samples
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.exports.meshes import MESH_SCALE, MeshFile
@@ -36,24 +35,27 @@ _TURNING = (
 )
 
 
-class _Resistance(NamedTuple):
-    """The resistance of both links in unbounded fluid."""
-
-    matrix: Samples  # (12, 12)
-    error: Any  # stated error of the model
-    references: list[str]  # sources of the model
-    warnings: list[Note]
-
-
 def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
     """Masses, joint, buoyancy and 12x12 resistance of a robot, SI; the joint angle is zero at the tail's `phase`."""
-    resistance = _resistance(robot, model)
+    chosen = find_swimmer_model(model)
+    if model not in FULL_MODELS:
+        raise InputError(
+            f"model = {model!r} does not give the whole resistance in unbounded fluid; allowed: "
+            f"{', '.join(FULL_MODELS)}"
+        )
+    batch = RobotBatch.of(robot)
+    outside = broken(chosen.domain(batch))
+    if outside:
+        raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
+    warnings = [limit.caution() for limit in broken(chosen.cautions(batch))]
+    if robot.coupling.length > 0 and "coupling" not in chosen.parts:
+        warnings.append(Note.named("links-without-coupling", model=model, models=", ".join(FULL_MODELS)))
     links = links_of(robot)
     content = {
         "robot": robot.name,
         "model": model,
-        "known_error": resistance.error,
-        "references": resistance.references,
+        "known_error": chosen.stated_error(robot.model),
+        "references": list(chosen.references),
         "viscosity": quantity(robot.fluid.viscosity, "Pa s"),
         "density": quantity(robot.fluid.density, "kg/m^3"),
         "gravity": quantity([0.0, 0.0, -STANDARD_GRAVITY], "m/s^2"),
@@ -65,30 +67,11 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
             "friction": quantity(joint_friction(robot), "N m s/rad"),
         },
         "links": {"body": _link_masses(links.body), "rotor": _link_masses(links.rotor)},
-        "matrix": {**quantity(resistance.matrix, ""), "unit": _UNITS},
+        "matrix": {**quantity(chosen.resistance(batch, np.zeros(1))[0], ""), "unit": _UNITS},
         "convention": _CONVENTION,
         "turning": _TURNING,
     }
-    return envelope("links", content, resistance.warnings)
-
-
-def _resistance(robot: Robot, model: str) -> _Resistance:
-    """The resistance by a model that knows all of it."""
-    chosen = find_swimmer_model(model)
-    if model not in FULL_MODELS:
-        raise InputError(
-            f"model = {model!r} does not give the whole resistance in unbounded fluid; allowed: "
-            f"{', '.join(FULL_MODELS)}"
-        )
-    batch = RobotBatch.of(robot)
-    outside = broken(chosen.domain(batch))
-    if outside:
-        raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
-    matrix = chosen.resistance(batch, np.zeros(1))[0]
-    warnings = [limit.caution() for limit in broken(chosen.cautions(batch))]
-    if robot.coupling.length > 0 and "coupling" not in chosen.parts:
-        warnings.append(Note.named("links-without-coupling", model=model, models=", ".join(FULL_MODELS)))
-    return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
+    return envelope("links", content, warnings)
 
 
 def joint_friction(robot: Robot) -> float:

@@ -11,6 +11,7 @@ import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -184,7 +185,11 @@ def export_run(
     counts: dict[str, int] = {}
     with atomic_write(target) as temporary, temporary.open("wb") as stream:
         writer = _Writer(stream, dataset)
-        for message in _messages(dataset, robot, poses, film, speed):
+        start, end = float(poses.time[0]), float(poses.time[-1])
+        scene: Message = ("/scene", _SCENE, start, {"deletions": [], "entities": _scene(robot, poses)})
+        films = [] if film is None else [_film(film, speed, start, end)]
+        moving = heapq.merge(_motion(dataset, poses), _events(dataset), *films, key=lambda message: message[2])
+        for message in chain([scene], moving):
             writer.add(message)
             counts[message[0]] = counts.get(message[0], 0) + 1
         writer.finish()
@@ -224,14 +229,6 @@ class _Writer:
     def finish(self) -> None:
         """Write index and end."""
         self._writer.finish()
-
-
-def _messages(
-    dataset: xr.Dataset, robot: Robot, poses: Poses, film: str | Path | None, speed: float
-) -> Iterator[Message]:
-    yield "/scene", _SCENE, float(poses.time[0]), {"deletions": [], "entities": _scene(robot, poses)}
-    films = [] if film is None else [_film(film, speed, float(poses.time[0]), float(poses.time[-1]))]
-    yield from heapq.merge(_motion(dataset, poses), _events(dataset), *films, key=lambda message: message[2])
 
 
 def _motion(dataset: xr.Dataset, poses: Poses) -> Iterator[Message]:

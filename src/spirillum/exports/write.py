@@ -86,16 +86,16 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
             )
             scene.add_geometry(surface, node_name=f"{label} surface", geom_name=label, parent_node_name=piece.part)
     scene.metadata |= {"robot": name, "unit": "m", "axes": "robot: x forward (nose), z up; joint: x axis of rotor"}
-    return bytes(scene.export(file_type="glb", include_normals=True, tree_postprocessor=_signed))
+    return bytes(
+        scene.export(
+            file_type="glb", include_normals=True, tree_postprocessor=lambda tree: tree["asset"].update(generator=MARK)
+        )
+    )
 
 
 def _linear(colour: np.ndarray) -> np.ndarray:
     """Linear light from sRGB, both 0 to 1 (IEC 61966-2-1)."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
-
-
-def _signed(tree: dict[str, Any]) -> None:
-    tree["asset"]["generator"] = MARK
 
 
 KINDS_OF_FILES = {
@@ -237,8 +237,15 @@ class Export(DisplayMixin):
         }
         if self.solid is not None:
             content["solid"] = dict(self.solid)
-        if self.unit is not None:
-            content |= _equations(self.unit)
+        if (unit := self.unit) is not None:
+            numbers = unit.parameters.values()
+            content |= {
+                **unit.prediction.answered_by,
+                "motion": unit.motion,
+                "friction": unit.prediction.friction,
+                "inputs": ["remote", "duty", *(["mean_flow"] if unit.flow is not None else [])],
+                "parameters": {item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in numbers},
+            }
         return envelope("export", content, self.warnings)
 
 
@@ -367,19 +374,6 @@ def _unit_of(model: FmuModel, target: Path, notes: Iterable[Note]) -> Export:
     robot, warnings = model.prediction.robot, tuple(dict.fromkeys((*model.prediction.warnings, *notes)))
     files = (Written(target, f"{KINDS_OF_FILES['.fmu']} with its C source"),)
     return Export(robot, 0.0, files, (), links_of(robot), None, warnings, model)
-
-
-def _equations(model: FmuModel) -> dict[str, Any]:
-    """Where the numbers of an FMU are from, and which they are."""
-    return {
-        **model.prediction.answered_by,
-        "motion": model.motion,
-        "friction": model.prediction.friction,
-        "inputs": ["remote", "duty", *(["mean_flow"] if model.flow is not None else [])],
-        "parameters": {
-            item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in model.parameters.values()
-        },
-    }
 
 
 def _commit(target: Path, contents: Mapping[str, bytes]) -> None:

@@ -154,12 +154,6 @@ def _robot(setup: str | Path, file: str, overrides: Mapping[str, Any] | None) ->
     return load(beside if beside.is_file() else file, **overrides)
 
 
-def _paced(source: Source, pace: str) -> Generator[Arrived, None, None]:
-    if pace == "fast":
-        return source.frames()
-    return newest(at_own_pace(source.frames()) if source.kind == "film" else source.frames())
-
-
 @dataclass
 class _Log:
     """The frames of a run so far: counts, latencies, and why it ended."""
@@ -184,7 +178,10 @@ class _Log:
     def run(self, report: OnObservation) -> None:
         """Track all frames; an interrupt is noted if any frame was tracked."""
         try:
-            with closing(_paced(self.source, self.pace)) as frames:
+            pictures = self.source.frames()
+            if self.pace != "fast":
+                pictures = newest(at_own_pace(pictures) if self.source.kind == "film" else pictures)
+            with closing(pictures) as frames:
                 for frame in frames:
                     report(*self.take(frame))
                     if self.length is not None and frame.time - self.start >= self.length:

@@ -20,8 +20,8 @@ from spirillum.units import KINDS, parse_option
 from spirillum.vision.camera.camera import opened, samples_of
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.constants import SEAL
-from spirillum.vision.track.learning import InitialDetection, learnt_from
-from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
+from spirillum.vision.track.learning import learnt_from
+from spirillum.vision.track.lone_outline import check_outline
 from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.video.frames import Frame, Video
 
@@ -174,8 +174,13 @@ class LiveTracker:
     def _begin(self, video: Video, samples: list[Frame]) -> None:
         """Learn by the cues of `measure`; by the outline where the robot hardly moved and nothing else is in view."""
         learnt = learnt_from(video, samples, self.setup, self.robot, self._folder)
-        outline = _checked_outline(learnt, samples, self.setup)
         start = learnt.known.start
+        frames, poses = (
+            [one.small(learnt.sight.reduction) for one in samples],
+            [start.expected(one.time) for one in samples],
+        )
+        appearance, alone = self.setup.robot.appearance, start.search is None
+        outline = check_outline(frames, poses, start.body, appearance, alone=alone)
         moved = float(np.ptp([pose.x for _, pose in start.path])) / start.body.optics.length_per_pixel
         if start.body.seal is not None and moved < SEAL.far_enough and not outline.suspect:
             learnt = learnt_from(video, samples, self.setup, self.robot, self._folder, by_seal=False)
@@ -183,14 +188,6 @@ class LiveTracker:
         if useless:
             raise InputError(useless[0].sentence)
         self._following = Following(video, self.setup, self.robot, learnt, outline, self._window)
-
-
-def _checked_outline(learnt: InitialDetection, samples: list[Frame], setup: Setup) -> OutlineCheck:
-    """What cover and background leave open of the outline on the frames that were learnt from."""
-    start, factor = learnt.known.start, learnt.sight.reduction
-    frames = [frame.small(factor) for frame in samples]
-    poses = [start.expected(frame.time) for frame in samples]
-    return check_outline(frames, poses, start.body, setup.robot.appearance, alone=start.search is None)
 
 
 def seconds(name: str, value: str | float, most: float = 600.0) -> float:

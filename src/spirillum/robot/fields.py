@@ -319,7 +319,7 @@ def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
     """Field names of the section that a location leads to."""
     for name in names:
         if name in model.model_fields:
-            found = _section(model.model_fields[name].annotation)
+            found = section_in(model.model_fields[name].annotation)
             model = found or model
     return tuple(model.model_fields)
 
@@ -328,18 +328,18 @@ def _range_at(model: type[BaseModel], names: Sequence[str]) -> str:
     """Both bounds of the number that a location leads to; empty where there are not two."""
     for name in names[:-1]:
         info = model.model_fields.get(name)
-        model = (info and _section(info.annotation)) or model
+        model = (info and section_in(info.annotation)) or model
     if not names or (info := model.model_fields.get(names[-1])) is None:
         return ""
     found = [getattr(item, name) for name in ("ge", "le") for item in all_metadata(info) if hasattr(item, name)]
     return f"{found[0]:g} to {found[1]:g}" if len(found) == 2 else ""
 
 
-def _section(annotation: Any) -> type[BaseModel] | None:
+def section_in(annotation: Any) -> type[BaseModel] | None:
     """The section class inside an annotation such as ``Channel | Literal['none']``."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for part in getattr(annotation, "__args__", ()):
-        if (found := _section(part)) is not None:
+        if (found := section_in(part)) is not None:
             return found
     return None

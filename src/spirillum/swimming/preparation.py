@@ -116,11 +116,14 @@ class Prepared(DisplayMixin):
     def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each."""
         stage = STAGES[self.table.stage]
-        worse = [
-            _worse(name, self.table.error[name], stage.accuracy * allowed, yawed=stage.yawed)
-            for name, allowed in RESPONSES.items()
-            if self.table.error[name] > stage.accuracy * allowed
-        ]
+        where = "at yawed poses between" if stage.yawed else "between"
+        worse = []
+        for name, allowed in RESPONSES.items():
+            error, most = self.table.error[name], stage.accuracy * allowed
+            if error > most:
+                off, bound = show_apart(100.0 * error, 100.0 * most, "1", least=2)
+                words = {"what": name.replace("_", " "), "off": off, "where": where, "most": bound}
+                worse.append(Note.named("table-error", name=name, **words))
         return (*self.robot.warnings, *worse)
 
     def to_dict(self) -> dict[str, Any]:
@@ -151,20 +154,11 @@ class Prepared(DisplayMixin):
         }
 
 
-def _worse(name: str, error: float, allowed: float, *, yawed: bool) -> Note:
-    """That a table is further off than one should be; both errors are relative."""
-    off, most = show_apart(100.0 * error, 100.0 * allowed, "1", least=2)
-    where = "at yawed poses between" if yawed else "between"
-    return Note.named("table-error", name=name, what=name.replace("_", " "), off=off, where=where, most=most)
-
-
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
-    """The answer of `spirillum prepare --json` for several robots: that of each, and what to be careful about."""
-    return envelope("preparations", {"robots": [one.content for one in found]}, _notes_of_several(found))
+    """The answer of `spirillum prepare --json` for several robots.
 
-
-def _notes_of_several(found: Sequence[Prepared]) -> list[Note]:
-    """Notes with their robots; the first of each code counts the others, which a terminal does not show."""
+    Notes name their robots; the first of each code counts the others, which a terminal does not show.
+    """
     several = len({one.robot.name for one in found}) < len(found)
     named: dict[str, dict[str, list[Note]]] = {}
     for one in found:
@@ -176,7 +170,7 @@ def _notes_of_several(found: Sequence[Prepared]) -> list[Note]:
         first, *others = [note.prefixed(f"{name}: ") for name, own in robots.items() for note in own]
         more = f" (and {len(robots) - 1} more of {len(found)} robots: --notes)" if len(robots) > 1 else ""
         notes += [Note(first.code, f"{first}{more}", first.fields), *others]
-    return notes
+    return envelope("preparations", {"robots": [one.content for one in found]}, notes)
 
 
 def prepare(

@@ -37,10 +37,6 @@ class TrialInterval(NamedTuple):
     high: float
     level: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """The entries of the quantity in JSON."""
-        return {**self._asdict(), "kind": "interval"}
-
 
 @dataclass(frozen=True)
 class ReleasedMotion:
@@ -59,7 +55,7 @@ class ReleasedMotion:
         """The object `trial` or `steady` of an answer."""
         if self.reason:
             return {"reason": self.reason}
-        over = {name: found.to_dict() for name, found in self.intervals.items()}
+        over = {name: {**found._asdict(), "kind": "interval"} for name, found in self.intervals.items()}
         values = {
             name: quantity(value, QUANTITIES[name].unit, **over.get(name, {})) for name, value in self.values.items()
         }
