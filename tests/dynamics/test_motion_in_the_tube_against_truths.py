@@ -15,7 +15,7 @@ from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.integration import Reach, integrate, observed_at
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import run_answer
-from spirillum.dynamics.start import InitialPose, state_at_release
+from spirillum.dynamics.start import released_state, state_at_release
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
@@ -33,6 +33,11 @@ from spirillum.swimming.steady import calibrated_resistance
 LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body
 ROUGH = Surroundings(roughness=5e-5)
 Made = tuple[Prediction, TubeRobot, Callable[..., Any]]
+
+
+def at(azimuth: float = 0.0, **pose: float) -> tuple[Placement, float]:
+    """Where a robot is released."""
+    return Placement.of(pose), azimuth
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +67,8 @@ def made(stand_in: Any) -> Callable[..., Made]:
 
         def run(start: Any, duration: float, *, on: Any = None, samples: int = 20, **options: Any) -> Any:
             timing = Timing(duration=duration, on=on, samples_per_turn=samples)
-            return tube_run(steady, links, start, timing.timetable(turn, 1.0), **options)
+            begun = released_state(robot, links, *start) if isinstance(start, tuple) else start
+            return tube_run(steady, links, begun, timing.timetable(turn, 1.0), **options)
 
         return steady, links, run
 
@@ -96,7 +102,7 @@ def rolling(rate: float) -> dict[str, Any]:
 def test_long_capsule_orbits_at_its_two_dimensional_law(made: Any, gap: float, rate: float) -> None:
     """Free of force and turning at Omega: around the tube at Omega lambda^2/(1 + lambda^2), at any offset."""
     _, _, run = made(overrides=rolling(rate), rest=1e-9, weight=False)
-    found = run(InitialPose(gap=gap), 2.0)
+    found = run(at(gap=gap), 2.0)
     law = rate * 0.45**2 / (1.0 + 0.45**2)
     # The straight side does not lie about mid-length; the law is that of its middle, which is at the same offset.
     assert float(found["azimuth"][-1]) == pytest.approx(2.0 * law, rel=1e-6)
@@ -119,8 +125,7 @@ def test_reversed_rotation_mirrors_the_azimuth(made: Any) -> None:
         overrides = {"tail.handedness": hand, "drive": {"kind": "rate", "joint": "revolute", "rate": f"{rate} rad/s"}}
         _, _, run = made(overrides=overrides)
         sign = 1.0 if hand == "right" else -1.0
-        phase = 0.4 if hand == "right" else np.pi - 0.4
-        runs.append(run(InitialPose(gap=4e-4, pitch=0.01, yaw=0.02 * sign, azimuth=0.3 * sign, phase=phase), 6.0))
+        runs.append(run(at(gap=4e-4, pitch=0.01, yaw=0.02 * sign, azimuth=0.3 * sign), 6.0))
     there, back = runs
     np.testing.assert_allclose(there["azimuth"], -back["azimuth"], atol=1e-8)
     np.testing.assert_allclose(there["wall_gap"], back["wall_gap"], rtol=1e-6)
@@ -133,7 +138,7 @@ def test_film_and_dry_contact_carry_opposite_ways(made: Any) -> None:
     thin = {**rolling(2.0), "fluid.viscosity": "0.1 Pa s"}
     _, _, on_film = made(Surroundings(roughness=1e-6, coefficient=0.3), rolling(2.0))
     _, _, on_tips = made(Surroundings(roughness=4e-4, coefficient=0.3), thin)
-    film, tips = on_film(InitialPose(gap=3e-4), 1.0), on_tips(InitialPose(gap=3e-4), 1.0)
+    film, tips = on_film(at(gap=3e-4), 1.0), on_tips(at(gap=3e-4), 1.0)
     assert float(film["azimuth"][-1]) > 0.01
     assert float(film["contact_force"].max()) == 0.0
     assert float(tips["azimuth"][-1]) < 0.0
@@ -151,7 +156,7 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
     time = np.linspace(0.0, 400.0, 21)
     from spirillum.dynamics.timing import Switch
 
-    start = state_at_release(steady.robot, links, InitialPose(gap=2e-4))
+    start = state_at_release(steady.robot, links, *at(gap=2e-4))
     found = integrate(links, start, time, [Switch(0.0, 0.0)], Reach(0.0, 0.0, np.inf, 0.0, np.inf))
     across = 0.009 * 0.02 / 0.011
     c = 3.5 * 3.0 * np.sqrt(2.0) * np.pi * across**1.5 * LENGTH
@@ -162,7 +167,7 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
 def test_robot_at_rest_lies_on_its_asperities_with_its_weight(made: Any) -> None:
     """Off, in a thin fluid, for long: the load is the weight, and nothing moves."""
     _, links, run = made(Surroundings(roughness=1e-4), {"fluid.viscosity": "0.01 Pa s", "model.beyond_stokes": True})
-    found = run(InitialPose(gap=2e-4), 60.0, on=[(1e3, 2e3)], samples=1)
+    found = run(at(gap=2e-4), 60.0, on=[(1e3, 2e3)], samples=1)
     heavy = float(links.weight[:2].sum())
     assert float(found["contact_force"][-1]) == pytest.approx(heavy * np.cos(float(found["azimuth"][-1])), rel=1e-4)
     assert float(found["wall_gap"][-1]) > 0.3e-4
@@ -193,7 +198,7 @@ def test_energy_is_balanced_with_contact(made: Any, coefficient: float, drive: s
         "torque": {"drive": {"kind": "torque", "joint": "revolute", "torque": "2e-4 N m"}},
     }
     _, _, run = made(Surroundings(roughness=2e-4, coefficient=coefficient), kinds[drive])
-    found = run(InitialPose(gap=1.5e-4, pitch=0.005), 8.0)
+    found = run(at(gap=1.5e-4, pitch=0.005), 8.0)
     assert left_of_energy(found) < 1e-6
     assert float(found["contact_force"].max()) > 0.01
     worked = float(found["contact_energy"][-1])
@@ -205,12 +210,12 @@ def test_energy_is_balanced_with_contact(made: Any, coefficient: float, drive: s
 def test_energy_is_balanced_in_a_flow_and_with_open_ends(made: Any) -> None:
     flow = np.array([[0.0, 0.0], [1.0, 2e-3], [2.5, -1e-3], [4.0, 1e-3]])
     _, _, run = made(Surroundings(roughness=2e-4, ends=kernel.IMPOSED, flow=flow))
-    found = run(InitialPose(gap=1.5e-4), 5.0)
+    found = run(at(gap=1.5e-4), 5.0)
     np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], *flow.T), atol=1e-15)
     assert left_of_energy(found) < 1e-6
     assert abs(float(found["flow_energy"][-1])) > 1e-9
     _, _, run = made(Surroundings(roughness=2e-4, ends=kernel.OPEN, length=0.37))
-    found = run(InitialPose(gap=1.5e-4), 3.0)
+    found = run(at(gap=1.5e-4), 3.0)
     assert left_of_energy(found) < 1e-6
     speed = float(found["forward_velocity"][-1])
     assert float(found["mean_flow"][-1]) == pytest.approx(0.05 * speed / (8 * np.pi * 0.37 + 5.0), rel=1e-2)
@@ -225,7 +230,7 @@ def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
         Surroundings(ends=kernel.OPEN, length=0),
     ):
         _, links, _ = made(around)
-        state = state_at_release(made()[0].robot, links, InitialPose(gap=5e-4))
+        state = state_at_release(made()[0].robot, links, *at(gap=5e-4))
         state[rigid_links.CURRENT] = 0.05
         speeds.append(observed_at(links, state)[0])
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-9)
@@ -235,7 +240,7 @@ def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
 def test_run_in_two_parts_is_the_run(made: Any) -> None:
     """Continued from where it ended, at any moment: to 1e-9 in all that a state holds."""
     _, _, run = made(Surroundings(roughness=1e-4, coefficient=0.2))
-    start = InitialPose(gap=3e-4, azimuth=0.2, yaw=0.01)
+    start = at(gap=3e-4, azimuth=0.2, yaw=0.01)
     whole, first = run(start, 9.0, wait=3.0), run(start, 4.321, wait=3.0)
     second = run(first, 9.0)
     assert float(second["time"][0]) > float(first["time"][-1])
@@ -253,7 +258,7 @@ def test_run_in_two_parts_is_the_run(made: Any) -> None:
 def test_events_happen_at_their_times(made: Any) -> None:
     """The nose at the end of the tube; touching where the gap is the asperities' height; an empty battery."""
     _, links, run = made(Surroundings(roughness=2e-4), {"channel.length": "0.107 m"})
-    found = run(InitialPose(gap=3e-4), 60.0)
+    found = run(at(gap=3e-4), 60.0)
     happened = events(found)
     end = happened["end of the channel"]
     assert float(found["time"][-1]) == end < 60.0
@@ -269,7 +274,7 @@ def test_events_happen_at_their_times(made: Any) -> None:
     assert links.names[1] == "body rear"
 
     _, _, run = made(overrides={"battery.capacity": "0.1 mA h"})
-    found = run(InitialPose(gap=3e-4), 3.0)
+    found = run(at(gap=3e-4), 3.0)
     assert 0 < events(found)["battery empty"] < float(found["time"][-1])
     assert float(found["duty"][-1]) == 0.0
     assert float(found["battery_charge_used"][-1]) == pytest.approx(0.36, rel=1e-9)
@@ -278,7 +283,7 @@ def test_events_happen_at_their_times(made: Any) -> None:
 def test_a_run_beyond_its_table_goes_on(made: Any) -> None:
     """The outer resistance is that of the nearest pose inside."""
     _, _, run = made(largest=0.005)
-    found = run(InitialPose(gap=1e-3, pitch=0.01), 1.0)
+    found = run(at(gap=1e-3, pitch=0.01), 1.0)
     assert np.max(np.abs(found["wall_pitch"])) > 0.005
     assert np.isfinite(found["forward_velocity"]).all()
     assert float(found["time"][-1]) == 1.0
@@ -289,7 +294,7 @@ def test_rates_solve_the_balance(made: Any) -> None:
     steady, links, _ = made(Surroundings(roughness=4e-4, coefficient=0.3))
     for gap in (3e-4, 1e-4, 3e-5):
         for current in (0.0, 1e-3, 0.05):
-            state = state_at_release(steady.robot, links, InitialPose(gap=gap, pitch=0.002, yaw=0.01))
+            state = state_at_release(steady.robot, links, *at(gap=gap, pitch=0.002, yaw=0.01))
             state[rigid_links.CURRENT] = current
             assert observed_at(links, state)[kernel.BALANCE] < 1e-12
     rng = np.random.default_rng(3)
@@ -371,7 +376,7 @@ def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
     _, links, _ = made()
     robot = made()[0].robot
     for pitch in (0.07, 0.078):
-        state = state_at_release(robot, links, InitialPose(gap=3e-4, pitch=pitch))
+        state = state_at_release(robot, links, *at(gap=3e-4, pitch=pitch))
         smallest = np.inf
         for phase in np.linspace(0.0, 2 * np.pi, 9):
             state[rigid_links.PHASE] = phase
@@ -413,7 +418,7 @@ def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float
     steady, links, _ = made(overrides={"tail": TAILS[tail]}, model="rft")  # its geometry alone matters
     dense = [swept.position for swept in [centreline_of(steady.robot, np.linspace(0.0, 1.0, 40001) * 0.06)]]
     points = np.concatenate([dense[0] @ turn.T for turn in steady.robot.tail.form.rotations])
-    state = state_at_release(steady.robot, links, InitialPose(gap=3e-4, pitch=pitch))
+    state = state_at_release(steady.robot, links, *at(gap=3e-4, pitch=pitch))
     found, true = [], []
     for phase in np.linspace(0.0, 2 * np.pi, 7):
         state[rigid_links.PHASE] = phase
@@ -426,10 +431,10 @@ def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float
     assert np.asarray(found)[seen] == pytest.approx(np.asarray(true)[seen], abs=5e-9)
 
 
-def near_the_wall(steady: Prediction, links: TubeRobot) -> InitialPose:
+def near_the_wall(steady: Prediction, links: TubeRobot) -> tuple[Placement, float]:
     """Nose up until the tail's roughness is at the wall."""
-    places = (InitialPose(gap=3e-4, pitch=pitch) for pitch in np.arange(0.06, 0.12, 1e-4))
-    return next(p for p in places if links.gaps(state_at_release(steady.robot, links, p))[-1] < ROUGH.roughness)
+    places = (at(gap=3e-4, pitch=pitch) for pitch in np.arange(0.06, 0.12, 1e-4))
+    return next(p for p in places if links.gaps(state_at_release(steady.robot, links, *p))[-1] < ROUGH.roughness)
 
 
 def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
@@ -442,7 +447,7 @@ def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
     for steady, links, _ in (curve, helix):
         own = links.stations[np.argmin(links.stations[:, contacts.STATION_XI])]
         turn = np.arctan2(own[contacts.STATION_POINT + 2], own[contacts.STATION_POINT + 1])
-        state = state_at_release(steady.robot, links, near_the_wall(*curve[:2]))
+        state = state_at_release(steady.robot, links, *near_the_wall(*curve[:2]))
         row = []
         for phase in np.linspace(0.0, 2 * np.pi, 9):
             state[rigid_links.PHASE] = phase - turn
@@ -478,7 +483,7 @@ def test_asperities_do_not_vanish_with_the_weight(made: Any) -> None:
 def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
     """A step that is tried too far leaves no number behind with which the next one begins."""
     steady, links, _ = made()
-    state, data = state_at_release(steady.robot, links, InitialPose(gap=3e-4)), links.data
+    state, data = state_at_release(steady.robot, links, *at(gap=3e-4)), links.data
     before, after, inside = np.empty((3, rigid_links.STATES))
     stand_in.steps.rates(before, 0.0, state, data, links.table)
     beyond = state.copy()
@@ -492,7 +497,7 @@ def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
 def test_robot_on_the_axis_goes_on_smoothly(made: Any) -> None:
     """Where the azimuth is nothing, path and attitude do not depend on it."""
     _, _, run = made(weight=False)
-    found = [run(InitialPose(eccentricity=e), 1.0) for e in (0.0, 1e-9)]
+    found = [run(at(eccentricity=e), 1.0) for e in (0.0, 1e-9)]
     np.testing.assert_allclose(found[0]["position"], found[1]["position"], atol=1e-9)
     assert left_of_energy(found[0]) < 1e-6
 
@@ -506,8 +511,8 @@ def test_interrupted_run_keeps_what_was_done(made: Any, monkeypatch: pytest.Monk
         if len(calls) == 4:
             raise KeyboardInterrupt
 
-    whole = run(InitialPose(gap=3e-4), 20.0)
-    part = run(InitialPose(gap=3e-4), 20.0, progress=stop)
+    whole = run(at(gap=3e-4), 20.0)
+    part = run(at(gap=3e-4), 20.0, progress=stop)
     assert "interrupted" in events(part)
     assert 0 < float(part["time"][-1]) < 20.0
     rest = run(part, 20.0)
@@ -516,13 +521,13 @@ def test_interrupted_run_keeps_what_was_done(made: Any, monkeypatch: pytest.Monk
 
 def test_start_has_the_gap_pitch_yaw_and_azimuth_asked_for(made: Any) -> None:
     steady, links, run = made()
-    found = run(InitialPose(gap=4e-4, pitch=-0.02, yaw=0.015, azimuth=0.4), 0.01)
+    found = run(at(gap=4e-4, pitch=-0.02, yaw=0.015, azimuth=0.4), 0.01)
     for name, value in (("wall_gap", 4e-4), ("wall_pitch", -0.02), ("wall_yaw", 0.015), ("azimuth", 0.4)):
         assert float(found[name][0]) == pytest.approx(value, rel=1e-9), name
     with pytest.raises(InputError, match="does not fit"):
-        state_at_release(steady.robot, links, InitialPose(gap=0.02))
+        state_at_release(steady.robot, links, *at(gap=0.02))
     with pytest.raises(InputError, match="cut"):
-        state_at_release(steady.robot, links, InitialPose(gap=5e-4, pitch=0.2))
+        state_at_release(steady.robot, links, *at(gap=5e-4, pitch=0.2))
 
 
 def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:

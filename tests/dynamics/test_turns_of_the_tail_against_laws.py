@@ -9,9 +9,10 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
-from spirillum.dynamics.start import InitialPose, state_at_release
+from spirillum.dynamics.start import state_at_release
 from spirillum.dynamics.steady_state_search import long_run
 from spirillum.dynamics.tube_robot import Surroundings, tube_robot
+from spirillum.robot.placement import Placement
 from spirillum.swimming.prediction import predict
 from spirillum.swimming.released_motion import LINKS
 from spirillum.swimming.steady import calibrated_resistance
@@ -38,7 +39,7 @@ def of_long_capsule(stand_in: Any, rate: float, hand: str = "right", *, weight: 
 def test_weightless_capsule_orbits_at_its_two_dimensional_law(stand_in: Any, rate: float) -> None:
     """Free of force and turning at Omega: around the tube at Omega lambda^2/(1 + lambda^2), at the gap it was given."""
     one, links = of_long_capsule(stand_in, rate, weight=False, rest=1e-9)
-    state = state_at_release(one, links, InitialPose(gap=5e-4))
+    state = state_at_release(one, links, Placement.of({"gap": 5e-4}))
     run = long_run(links, state, np.sign(rate), heavy=False, until=None, progress=lambda *_: None)
     assert run.lying.state == "orbits"
     assert run.lying.orbit_rate == pytest.approx(rate * 0.45**2 / (1.0 + 0.45**2), rel=1e-5)
@@ -50,7 +51,7 @@ def test_mirrored_robot_comes_to_lie_on_the_other_side(stand_in: Any) -> None:
     places = []
     for hand, rate in (("right", 2.0), ("left", -2.0)):
         one, links = of_long_capsule(stand_in, rate, hand, weight=True, rest=1.0)
-        turns, state = ReturnMap(links, np.sign(rate)), state_at_release(one, links, InitialPose(gap=3e-4))
+        turns, state = ReturnMap(links, np.sign(rate)), state_at_release(one, links, Placement.of({"gap": 3e-4}))
         for _ in range(20):
             state = turns.after(state).state
         place = fixed_place(turns, state, heavy=True)

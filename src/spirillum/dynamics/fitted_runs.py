@@ -167,7 +167,7 @@ def intervals_of_free_motion(
     for number, (index, one) in enumerate(zip(indices, posterior.drawn(unbound, DRAWS, rng), strict=True)):
         if progress is not None:
             progress("draws of the posterior", number, len(indices))
-        held, links, _ = prepare_release(one, found.release._replace(contact=posterior.contact(index)))
+        held, links = prepare_release(one, found.release._replace(contact=posterior.contact(index)))
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
         if fixed is None or abs(fixed.multiplier) > STABLE:
             continue

@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress, Reach, integrate, observed_at
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
-from spirillum.dynamics.start import InitialPose, released_state
+from spirillum.dynamics.start import released_state
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -130,8 +130,8 @@ def free_motion(
         _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
     release = Release(table, placed, requested, height, contact, tail_rate, friction, weight)
-    held, links, start = prepare_release(ready, release)
-    state = released_state(ready, links, start)
+    held, links = prepare_release(ready, release)
+    state = released_state(ready, links, placed, touching.azimuth)
     gap = float(observed_at(links, state)[rigid_links.FILM])
     _check_until(until, gap)
     load_size = abs(float(links.weight[: rigid_links.MOMENT_BODY].sum())) * links.length
@@ -170,8 +170,8 @@ def free_motion(
     return FreeMotion(found, run, links, gap, release, checked)
 
 
-def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot, InitialPose]:
-    """The robot held at its initial pose, the coefficients of its rates with its drive on, and that pose."""
+def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot]:
+    """The robot held at its initial pose, and the coefficients of its rates with its drive on."""
     rough, touching = with_contact(release.contact, release.roughness, release.in_tube)
     held = predict(
         robot,
@@ -181,14 +181,14 @@ def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRob
         placement=release.placement,
         band=False,
     )
-    links, start = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
+    links = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
     if held.tail_rate is None:
         drive = held.robot.drive
-        return held, links.at_duty(1.0 if drive is None else drive.duty), start
+        return held, links.at_duty(1.0 if drive is None else drive.duty)
     changed = links.drive.copy()
     changed[rigid_links.KIND], changed[rigid_links.DUTY] = rigid_links.RATE, 1.0
     changed[rigid_links.GIVEN] = held.tail_rotation_rate
-    return held, replace(links, drive=changed), start
+    return held, replace(links, drive=changed)
 
 
 def _check_until(until: float | None, gap: float) -> None:

@@ -31,7 +31,6 @@ from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.start import (
-    InitialPose,
     links_without_walls,
     reach_of,
     released_state,
@@ -180,8 +179,8 @@ class Plant:
             self._links = without_walls = links_without_walls(self.steady, height, weight=weight)
             first = resting_state(own, without_walls, placed)
         else:
-            links, start = self._in(self._table, placed)
-            self._links, first = links, released_state(own, links, start)
+            self._links = links = self._in(self._table, placed)
+            first = released_state(own, links, placed, requested.azimuth)
         on = own.drive.duty
         self._first = PlantState(
             time=0.0,
@@ -381,10 +380,10 @@ class Plant:
             if velocity is not None:
                 raise InputError("flow is known only to model 'tube'; allowed: another model, or no flow")
             return
-        links, _ = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
+        links = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
         self._links = links if self._now.field is None else self._now.field.on(links)
 
-    def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, InitialPose]:
+    def _in(self, table: TubeTable, placed: Placement) -> TubeRobot:
         return links_in_tube(self.steady, table, placed, self._requested, self._height, weight=self._weight)
 
     def _commanded(self, *, remote: bool | None, duty: float | None) -> float:

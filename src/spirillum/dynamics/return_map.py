@@ -16,7 +16,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach, observed_at, watched_limits
-from spirillum.dynamics.start import InitialPose, state_at
+from spirillum.dynamics.start import state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links, stiff_steps
@@ -307,12 +307,14 @@ class _Chart:
         """The state at coordinates, (19,)."""
         from scipy.optimize import brentq
 
-        start = InitialPose(pitch=float(x[2]), yaw=float(x[3]), azimuth=float(x[0]), phase=self._phase)
-        radius = float(self._robot.tube[kernel.RADIUS])
-        offset = brentq(
-            lambda e: self._closeness(state_at(start, e)) - x[1], 1e-6 * radius, radius, xtol=1e-15 * radius, rtol=1e-15
-        )
-        found = state_at(start, float(offset))
+        azimuth, closeness, pitch, yaw = map(float, x)
+
+        def at(offset: float) -> Samples:
+            return state_at(offset, self._phase, pitch, yaw, azimuth)
+
+        low, high = (share * float(self._robot.tube[kernel.RADIUS]) for share in (1e-6, 1.0))
+        offset = brentq(lambda e: self._closeness(at(e)) - closeness, low, high, xtol=1e-15 * high, rtol=1e-15)
+        found = at(float(offset))
         found[rigid_links.CURRENT] = self.current
         return found
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from spirillum.arrays import Samples
@@ -14,7 +12,6 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.library import THINNEST_GAP
 from spirillum.kernels import rigid_links, tube_motion
 from spirillum.kernels import two_links as links_kernel
-from spirillum.kernels.rigid_links import ATTITUDE, PHASE, POSITION, STATES
 from spirillum.robot.geometry import Channel
 from spirillum.robot.links import outlines_of
 from spirillum.robot.placement import Placement
@@ -27,14 +24,8 @@ from spirillum.units import show
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
     """The state of a robot at rest in its initial pose, (19,)."""
     _check(robot, placement)
-    state = np.zeros(STATES)
-    state[PHASE] = start_phase(robot)
-    pitch = placement.pitch or 0.0
-    state[ATTITUDE], state[ATTITUDE + 2] = np.cos(0.5 * pitch), -np.sin(0.5 * pitch)
-    if robot.channel is None:
-        return state
-    state[POSITION + 2] = -_pose(robot, placement, robot.channel, lying=lying).offset
-    return state
+    offset = 0.0 if robot.channel is None else _pose(robot, placement, robot.channel, lying=lying).offset
+    return state_at(offset, start_phase(robot), placement.pitch or 0.0)
 
 
 def start_phase(robot: Robot) -> float:
@@ -147,39 +138,23 @@ def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Sample
     )
 
 
-@dataclass(frozen=True)
-class InitialPose:
-    """A pose in the tube; SI, angles in rad."""
-
-    gap: float | None = None
-    """Smallest distance of the body to the wall; None: that of the eccentricity, or 1/18 of the body's radius."""
-    eccentricity: float | None = None
-    """Offset of the body's mid-length over R - a instead."""
-    pitch: float = 0.0
-    """Angle of the nose away from the nearest wall: up, at the lowest point of the tube."""
-    yaw: float = 0.0
-    """Angle of the nose across the plane of tube and body, to +y at the lowest point of the tube."""
-    azimuth: float = 0.0
-    """Azimuth of the body's mid-length about +x from the lowest point of the tube."""
-    phase: float = 0.0
-
-
-def state_at_release(robot: Robot, links: TubeRobot, start: InitialPose) -> Samples:
+def state_at_release(robot: Robot, links: TubeRobot, placed: Placement, azimuth: float = 0.0) -> Samples:
     """The state of a robot at rest at a pose, (19,)."""
-    radius, a = float(links.tube[tube_motion.RADIUS]), 0.5 * robot.body.diameter
-    if start.eccentricity is not None:
-        state = state_at(start, start.eccentricity * (radius - a))
+    radius, a, pitch = float(links.tube[tube_motion.RADIUS]), 0.5 * robot.body.diameter, placed.pitch or 0.0
+    if placed.eccentricity is not None:
+        offset = placed.eccentricity * (radius - a)
     else:
-        gap = GAP_SHARE * a if start.gap is None else start.gap
+        gap = GAP_SHARE * a if placed.gap is None else placed.gap
         body = outlines_of(robot)["body"]
-        offset = TubePose.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset
+        offset = TubePose.at_gap(body, radius, gap, pitch, yaw=placed.yaw).offset
         if not offset >= -1e-12 * radius:
-            most = max(largest_gap(body, radius, start.pitch, start.yaw), 0.0)
+            most = max(largest_gap(body, radius, pitch, placed.yaw), 0.0)
             raise InputError(
                 f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
                 f"{show(most, 'mm')}, or a smaller pitch or yaw"
             )
-        state = state_at(start, max(offset, 0.0))
+        offset = max(offset, 0.0)
+    state = state_at(offset, start_phase(robot), pitch, placed.yaw, azimuth)
     gaps = links.gaps(state)
     if gaps.min() <= 0.0:
         name = links.names[int(np.argmin(gaps))]
@@ -204,9 +179,9 @@ def check_roughness(roughness: float, gap: float, diameter: float) -> None:
         )
 
 
-def released_state(robot: Robot, links: TubeRobot, start: InitialPose) -> Samples:
+def released_state(robot: Robot, links: TubeRobot, placed: Placement, azimuth: float) -> Samples:
     """The state of a robot at rest at a pose that its asperities allow and its table holds, (19,)."""
-    state = state_at_release(robot, links, start)
+    state = state_at_release(robot, links, placed, azimuth)
     gap = float(links.gaps(state).min())
     check_roughness(links.roughness, gap, robot.body.diameter)
     if observed_at(links, state)[rigid_links.OUTSIDE]:
@@ -217,14 +192,18 @@ def released_state(robot: Robot, links: TubeRobot, start: InitialPose) -> Sample
     return state
 
 
-def state_at(start: InitialPose, offset: float) -> Samples:
-    """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, in place of the start's gap."""
+def state_at(offset: float, phase: float, pitch: float, yaw: float = 0.0, azimuth: float = 0.0) -> Samples:
+    """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, and its angles, rad.
+
+    The azimuth is that of the body's mid-length about +x from the lowest point of the tube. There the pitch raises the
+    nose from the wall, and the yaw turns it to +y.
+    """
     from scipy.spatial.transform import Rotation
 
     state = np.zeros(rigid_links.STATES)
-    turned = Rotation.from_euler("XZY", [start.azimuth, start.yaw, -start.pitch])
+    turned = Rotation.from_euler("XZY", [azimuth, yaw, -pitch])
     state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = turned.as_quat(scalar_first=True)
-    state[rigid_links.PHASE] = start.phase
-    state[rigid_links.POSITION + 1] = offset * np.sin(start.azimuth)
-    state[rigid_links.POSITION + 2] = -offset * np.cos(start.azimuth)
+    state[rigid_links.PHASE] = phase
+    state[rigid_links.POSITION + 1] = offset * np.sin(azimuth)
+    state[rigid_links.POSITION + 2] = -offset * np.cos(azimuth)
     return state

@@ -19,7 +19,7 @@ from spirillum.dynamics.integration import (
 )
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
-from spirillum.dynamics.start import InitialPose, reach_of, released_state
+from spirillum.dynamics.start import reach_of
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
@@ -47,13 +47,15 @@ _ASIDE = 1e-3
 def tube_run(
     steady: Prediction,
     robot: TubeRobot,
-    start: InitialPose | xr.Dataset,
+    start: Samples | xr.Dataset,
     times: Timetable,
     *,
     wait: float = 0.0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The run of a robot in its tube, as of a free run, with its pose and contacts and a `checkpoint` to continue from.
+    """The run of a robot in its tube from a state, (19,), or from where an earlier one ended.
+
+    It is a free run with pose and contacts, and a `checkpoint` to continue from.
 
     Time 0 is when the remote may first switch the drive on. A robot that waits before, with its drive off, does so at
     negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while it
@@ -63,8 +65,8 @@ def tube_run(
     before: tuple[Event, ...] = ()
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
-    if isinstance(start, InitialPose):
-        first, before = _waited(robot, released_state(steady.robot, robot, start), wait, reach, progress)
+    if isinstance(start, np.ndarray):
+        first, before = _waited(robot, start, wait, reach, progress)
     else:
         first = _checkpoint(start)
         moments = np.append(float(start["time"][-1]), moments[moments > float(start["time"][-1])])
@@ -76,7 +78,7 @@ def tube_run(
     run = integrate(robot, first, moments, times.switches, reach, progress)
     if run.time.size < _FEWEST:
         what = run.events[-1].what if run.events else "the equations have no next step"
-        if isinstance(start, InitialPose):
+        if isinstance(start, np.ndarray):
             raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
         raise InputError(f"the run cannot be continued: {what}; allowed: a run that ended where it can go on")
     ended = float(run.time[-1])
@@ -97,7 +99,7 @@ def tube_run(
     }
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     found = series_in_tube(run)
-    if not isinstance(start, InitialPose):
+    if not isinstance(start, np.ndarray):
         last = start.isel(time=-1)
         begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
         found["tail_angle"] = tail_angle_of(run.states, begun)

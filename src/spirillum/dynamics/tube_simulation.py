@@ -14,7 +14,7 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.rotating_field import Field, in_tilted_field
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.run_summary import end_state
-from spirillum.dynamics.start import InitialPose, check_roughness, start_phase, turning_rate
+from spirillum.dynamics.start import check_roughness, released_state, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
@@ -152,13 +152,15 @@ def run_in_tube(
     """A run with six degrees of freedom in the robot's tube."""
     robot = steady.robot
     own = robot.drive.duty if robot.drive is not None else 1.0
-    links, start = links_in_tube(steady, table, placed, options, roughness, weight=weight)
+    links = links_in_tube(steady, table, placed, options, roughness, weight=weight)
     links = replace(in_tilted_field(links, field), tolerance=tolerance)
     turn = links.turn
     timetable = times.timetable(turn, own)
-    begun = (
-        start if options.continued is None else earlier_run(options.continued, steady, table, links, timetable.switches)
-    )
+    begun: Samples | xr.Dataset
+    if options.continued is None:
+        begun = released_state(robot, links, placed, options.azimuth)
+    else:
+        begun = earlier_run(options.continued, steady, table, links, timetable.switches)
     dataset = tube_run(steady, links, begun, timetable, wait=options.wait or 0.0, progress=progress)
     poses = {name: dataset[of].values for name, of in _POSES.items()}
     checked = compare_with_check(links.table, **poses, time=dataset["time"].values)
@@ -191,20 +193,11 @@ def run_in_tube(
 
 def links_in_tube(
     steady: Prediction, table: TubeTable, placed: Placement, options: InTube, roughness: float | None, *, weight: bool
-) -> tuple[TubeRobot, InitialPose]:
-    """Coefficients of a robot's rates in its tube, and its initial pose."""
+) -> TubeRobot:
+    """Coefficients of a robot's rates in its tube."""
     turn = 2.0 * np.pi / turning_rate(steady)
     around = _around(steady.robot, placed, options, roughness)
-    links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
-    start = InitialPose(
-        gap=placed.gap,
-        eccentricity=placed.eccentricity,
-        pitch=placed.pitch or 0.0,
-        yaw=placed.yaw,
-        azimuth=options.azimuth,
-        phase=start_phase(steady.robot),
-    )
-    return links, start
+    return tube_robot(steady, table.packed, around, turn=turn, weight=weight)
 
 
 def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
