@@ -29,8 +29,7 @@ class Quantity(NamedTuple):
         return for_people(self.unit)
 
 
-QUANTITIES = {row["name"]: Quantity(**row) for row in rows_of("quantities.csv")}
-"""Every quantity by its name."""
+QUANTITIES = {row["name"]: Quantity(**row) for row in rows_of("quantities.csv")}  #: Every quantity by its name.
 
 
 def unit_of(name: str) -> str:

@@ -44,8 +44,7 @@ class Calibrated(DisplayMixin):
 
     problem: Problem
     method: Method
-    reading: str
-    """Reading of the friction under which B_eff follows from (18)."""
+    reading: str  #: Reading of the friction under which B_eff follows from (18).
     values: dict[str, Estimate]
     friction: tuple[Estimate, ...]
     """B_eff of every robot, N m s/rad; empty where it was not requested, NaN where no motor rate was observed. Without
@@ -53,14 +52,12 @@ class Calibrated(DisplayMixin):
     """
     friction_sensitivity: dict[str, Samples]
     """Change of B_eff of every robot per relative change of a constant of fluid or motor, N m s/rad, by its field."""
-    friction_statement: str
-    """What the intervals of B_eff take as exact, in a sentence; empty where there is no B_eff."""
+    friction_statement: str  #: What the intervals of B_eff take as exact, in a sentence; empty where there is no B_eff.
     predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
     """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
     discrepancy: dict[Quantity, Estimate]
     """Relative misfit of the model from robot to robot, beyond the scatter of the trials."""
-    error: dict[Quantity, float]
-    """Relative error of one trial."""
+    error: dict[Quantity, float]  #: Relative error of one trial.
     paper: PaperFit | None
     least_squares: LeastSquares | None
     posterior: Posterior | None
@@ -71,10 +68,8 @@ class Calibrated(DisplayMixin):
     is `friction`."""
     friction_within_model: tuple[Estimate, ...] = ()
     """B_eff of every robot with the stated uncertainties of its constants, were the model exact."""
-    model_reason: str = ""
-    """Why the model was fitted, in half a sentence; empty where it was named."""
-    folder: Path | None = None
-    """Folder of the files that were written, if any were."""
+    model_reason: str = ""  #: Why the model was fitted, in half a sentence; empty where it was named.
+    folder: Path | None = None  #: Folder of the files that were written, if any were.
     files: tuple[str, ...] = ()
 
     @property

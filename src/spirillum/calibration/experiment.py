@@ -36,13 +36,11 @@ from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.swimming.drawn_resistance import error_of_mean
 
-Quantity = Literal["advance", "turning", "motor_rate"]
-"""U/omega (or U/omega_m), Omega/omega, omega_m."""
+Quantity = Literal["advance", "turning", "motor_rate"]  #: U/omega (or U/omega_m), Omega/omega, omega_m.
 
 _FEWEST_EQUAL = 3
 """Rows of equal speed that were not measured, if they are of that many tails, or have that many digits."""
-_NEAR_ZERO = 3.0
-"""Standard errors within which a mean may be backwards by chance."""
+_NEAR_ZERO = 3.0  # standard errors within which a mean may be backwards by chance
 _FLOOR = 0.1
 """Smallest scale of a relative error, over the median of all robots: a mean near zero has no relative error."""
 
@@ -51,16 +49,11 @@ _FLOOR = 0.1
 class Ratio:
     """One quantity of every robot: mean over the trials, and the error estimated from their scatter."""
 
-    mean: Samples
-    """SI; NaN where it was not observed."""
-    trials: Samples
-    """Number of trials in the mean."""
-    scale: Samples
-    """What the error of a trial is relative to: the mean's size."""
-    squares: Samples
-    """Sum of squares of the trials' deviations from the mean, over the scale squared."""
-    freedom: Samples
-    """Degrees of freedom of that sum."""
+    mean: Samples  #: SI; NaN where it was not observed.
+    trials: Samples  #: Number of trials in the mean.
+    scale: Samples  #: What the error of a trial is relative to: the mean's size.
+    squares: Samples  #: Sum of squares of the trials' deviations from the mean, over the scale squared.
+    freedom: Samples  #: Degrees of freedom of that sum.
     stated: Samples
     """Relative standard error of one trial as the file states it, over the scale; NaN where it does not."""
 
@@ -100,31 +93,21 @@ class Ratio:
 class Experiment:
     """The robots of an observations file, and what was seen of each."""
 
-    robots: tuple[Robot, ...]
-    """One for each tail in each channel."""
-    channels: tuple[float, ...]
-    """Channel diameters, m, ascending."""
-    channel: np.ndarray
-    """Index of each robot's channel in `channels`."""
-    rows: tuple[tuple[int, ...], ...]
-    """Rows of the file that belong to each robot."""
-    advance: Ratio
-    """U/omega, m/rad; where the tail's rate was not observed U/omega_m."""
-    by_motor: np.ndarray
-    """Whether the advance is over the motor's rate."""
-    turning: Ratio
-    """Omega/omega."""
-    motor_rate: Ratio
-    """omega_m, rad/s."""
+    robots: tuple[Robot, ...]  #: One for each tail in each channel.
+    channels: tuple[float, ...]  #: Channel diameters, m, ascending.
+    channel: np.ndarray  #: Index of each robot's channel in `channels`.
+    rows: tuple[tuple[int, ...], ...]  #: Rows of the file that belong to each robot.
+    advance: Ratio  #: U/omega, m/rad; where the tail's rate was not observed U/omega_m.
+    by_motor: np.ndarray  #: Whether the advance is over the motor's rate.
+    turning: Ratio  #: Omega/omega.
+    motor_rate: Ratio  #: omega_m, rad/s.
     tail_rate: Samples
     correlation: float
     """Between the errors of advance and turning within a robot's trials, which share their tail rate."""
     source: str
     sha256: str
-    synthetic: bool
-    """Whether the file states that its numbers are synthetic."""
-    outliers: tuple[Note, ...] = ()
-    """Trials that are far off the others of their tail, a sentence each."""
+    synthetic: bool  #: Whether the file states that its numbers are synthetic.
+    outliers: tuple[Note, ...] = ()  #: Trials that are far off the others of their tail, a sentence each.
     doubts: tuple[Note, ...] = ()
     """What is doubtful of the rows, such as trials of one tail that are equal in every number, a sentence each."""
 
@@ -303,8 +286,7 @@ class _Trials:
     trials: int
     squares: float
     freedom: float
-    stated: float = float("nan")
-    """Relative standard error of one trial, root mean square over those that state one."""
+    stated: float = float("nan")  #: Relative standard error of one trial, root mean square over those that state one.
 
     @property
     def is_near_zero(self) -> bool:

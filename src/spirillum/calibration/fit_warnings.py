@@ -29,18 +29,13 @@ RATES_IN_RADIANS = Note(
 """Caution where most of the robots would need more torque than their motors give."""
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 """Name of each compared quantity in a sentence."""
-_LARGE_MISFIT = 0.03
-"""Relative misfit from which on a warning states it."""
-_BEYOND_TRIALS = 2.0 * ERROR_SCALE
-"""Discrepancy larger than any plausible relative error of a trial."""
+_LARGE_MISFIT = 0.03  # relative misfit from which on a warning states it
+_BEYOND_TRIALS = 2.0 * ERROR_SCALE  # discrepancy larger than any plausible relative error of a trial
 _IMPLAUSIBLE_FACTOR = 10.0
 """Median misfit, as a factor, beyond which observations and model must differ in robot or units."""
-_PRINTED = 0.1
-"""Relative difference of the body's rates beyond which a friction model contradicts the observations."""
-_IMPLAUSIBLE_DISTANCE = 5.0
-"""Standard deviations from the median of a wide prior beyond which a fit is refused."""
-_WIDE = 0.5
-"""Smallest logarithmic standard deviation of a prior that is called wide."""
+_PRINTED = 0.1  # relative difference of the body's rates beyond which a friction model contradicts the observations
+_IMPLAUSIBLE_DISTANCE = 5.0  # standard deviations from the median of a wide prior beyond which a fit is refused
+_WIDE = 0.5  # smallest logarithmic standard deviation of a prior that is called wide
 _EDGE, _PILED = 0.05, 0.4
 """Outermost share of a bounded prior, and the share of a posterior in it from which on its end decides the interval."""
 _OUTLYING, _LEAST_OUTLYING = 6.0, 0.2

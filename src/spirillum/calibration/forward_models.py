@@ -59,10 +59,8 @@ class Predicted:
     """Predictions at draws of the parameters, (draws, robots)."""
 
     advance: Samples
-    turning: Samples
-    """Omega/omega."""
-    load: Samples
-    """T_h/omega: torque that turns the rotor against the fluid, N m s."""
+    turning: Samples  #: Omega/omega.
+    load: Samples  #: T_h/omega: torque that turns the rotor against the fluid, N m s.
 
     def over_motor(self) -> Samples:
         """U/omega_m, m/rad."""
@@ -73,12 +71,9 @@ class Predicted:
 class DryContact:
     """Quantities on which dry friction under the robots depends, beside its coefficient."""
 
-    weight: PerRobot
-    """Weight in the fluid, N."""
-    radius: PerRobot
-    """Of the body, m."""
-    tail_rate: PerRobot
-    """Observed rate of the tail, rad/s."""
+    weight: PerRobot  #: Weight in the fluid, N.
+    radius: PerRobot  #: Of the body, m.
+    tail_rate: PerRobot  #: Observed rate of the tail, rad/s.
 
 
 @dataclass(frozen=True)
@@ -86,16 +81,13 @@ class Forward:
     """The robots of an experiment, prepared for evaluation."""
 
     resistance: DrawnResistance
-    electrics: Electrics | None
-    """Motor and battery of the robots."""
-    viscosity: Samples
-    """The robots' own, Pa s."""
+    electrics: Electrics | None  #: Motor and battery of the robots.
+    viscosity: Samples  #: The robots' own, Pa s.
     isolated: tuple[Values, Values] = (np.zeros(1), np.zeros(1))
     """D_x, N s/m, and E_x, N m s, of each robot's body alone at its own viscosity, on which the factors act."""
     factors: Mapping[str, Samples] = field(default_factory=dict)
     """The robots' own factors, where they are not free; 1 where they have none."""
-    contact: DryContact | None = None
-    """Ranges of dry friction under the robots."""
+    contact: DryContact | None = None  #: Ranges of dry friction under the robots.
 
     def matrices(self, draws: Draws) -> Samples:
         """Balance matrices, (draws, robots, 3, 3), with all factors and dry friction in them."""
@@ -282,10 +274,8 @@ def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:
 
 FREE = ("shared_friction", "friction_coefficient", "roughness")
 """Parameters that a fit of trials may free: the pose follows from the run."""
-_RUNS = {1: 16, 2: 32, 3: 64}
-"""Trials of each robot, by the number of free parameters."""
-_FEWEST = 0.75
-"""Share of a robot's trials that have to have an answer."""
+_RUNS = {1: 16, 2: 32, 3: 64}  # trials of each robot, by the number of free parameters
+_FEWEST = 0.75  # share of a robot's trials that have to have an answer
 Ends = Mapping[str, tuple[float, float]]
 
 
@@ -294,14 +284,11 @@ class TrialSurfaces:
     """Observables of the trials of an experiment as functions of the free parameters."""
 
     names: tuple[str, ...]
-    ends: Ends
-    """Least and largest value of each parameter at which trials were made."""
+    ends: Ends  #: Least and largest value of each parameter at which trials were made.
     surfaces: tuple[RBFInterpolator, ...]
     """For each robot U/omega, Omega/omega and the motor's rate over the logarithms of the parameters."""
-    scales: Samples
-    """Sizes of these three of each robot, (robots, 3)."""
-    error: float
-    """Median relative error of advance and motor rate at trials that were left out."""
+    scales: Samples  #: Sizes of these three of each robot, (robots, 3).
+    error: float  #: Median relative error of advance and motor rate at trials that were left out.
 
     def at(self, draws: Draws) -> tuple[Samples, Samples, Samples]:
         """U/omega, m/rad, Omega/omega and omega_m, rad/s, (draws, robots) each; beyond the ends as at these."""

@@ -31,20 +31,16 @@ from spirillum.fluid.reference_errors import CHECKED, tail_error
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 
-_UNKNOWN = 1.0
-"""Singular value below which the prior is more informative than the observations."""
+_UNKNOWN = 1.0  # singular value below which the prior is more informative than the observations
 _POOR = 3.0
-FAR = 3.0
-"""Standard deviations of the prior beyond which the observations have overruled it."""
+FAR = 3.0  #: Standard deviations of the prior beyond which the observations have overruled it.
 _COLLINEAR = 1e4
 """Collinearity index (inverse of the least singular value of the Jacobian with normalised columns; Brun et al. 2001)
 from which on parameters cannot be distinguished by the observations. Identifiable sets have some tens at most, others
 more than 1e7, which is infinity up to rounding.
 """
-_INVOLVED = 0.05
-"""Least share of a collinear direction at which a number is named."""
-_MEMBER = 0.25
-"""Least share of a direction, over that of the first, at which a number is named."""
+_INVOLVED = 0.05  # least share of a collinear direction at which a number is named
+_MEMBER = 0.25  # least share of a direction, over that of the first, at which a number is named
 
 
 @dataclass(frozen=True)
@@ -52,16 +48,11 @@ class Identifiability:
     """Directions of the free numbers, from the best known to the least."""
 
     labels: tuple[str, ...]
-    sensitivity: Samples
-    """Root mean square relative change of all predictions per relative change of each number."""
-    singular: Samples
-    """Singular values: how many times narrower than the prior the observations make each direction."""
-    directions: Samples
-    """(directions, numbers), unit vectors in coordinates of the prior."""
-    correlation: Samples
-    """Between the numbers, from the observations alone."""
-    warnings: tuple[Note, ...]
-    """What is not identifiable, in words."""
+    sensitivity: Samples  #: Root mean square relative change of all predictions per relative change of each number.
+    singular: Samples  #: Singular values: how many times narrower than the prior the observations make each direction.
+    directions: Samples  #: (directions, numbers), unit vectors in coordinates of the prior.
+    correlation: Samples  #: Between the numbers, from the observations alone.
+    warnings: tuple[Note, ...]  #: What is not identifiable, in words.
 
     @property
     def unknown(self) -> int:
@@ -163,10 +154,8 @@ class LikelihoodProfile:
     """Least misfit with one number held."""
 
     label: str
-    values: Samples
-    """Held values."""
-    misfit: Samples
-    """Sum of squared residuals above its least; 3.84 is the limit of the 95 % interval."""
+    values: Samples  #: Held values.
+    misfit: Samples  #: Sum of squared residuals above its least; 3.84 is the limit of the 95 % interval.
 
 
 def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[LikelihoodProfile]:

@@ -32,20 +32,15 @@ from spirillum.errors import InputError
 from spirillum.units import display_unit, in_unit
 
 _STARTS = 6
-_STEP = 1e-4
-"""Step of the central differences, in standard deviations of the prior."""
+_STEP = 1e-4  # step of the central differences, in standard deviations of the prior
 _SMALL_STEP = float(np.sqrt(np.finfo(float).eps))
 """Step of the forward differences during the fit, relative to coordinates above one."""
-_BLIND = 1e-8
-"""Relative change of a prediction by one standard deviation of a prior that is none but rounding."""
-LARGEST = 12.0
-"""Standard deviations of the prior to either side within which a fit looks."""
+_BLIND = 1e-8  # relative change of a prediction by one standard deviation of a prior that is none but rounding
+LARGEST = 12.0  #: Standard deviations of the prior to either side within which a fit looks.
 _BREATH = 1e-2
 """Weight of the prior in the first fit: it holds a number that nothing observed holds, and moves no other."""
-FEWEST_LEFT = 0.5
-"""Degrees of freedom below which a fit leaves no residual to judge the model by."""
-_MIDDLE = 0.6745
-"""Median of a half-normal number over its scale."""
+FEWEST_LEFT = 0.5  #: Degrees of freedom below which a fit leaves no residual to judge the model by.
+_MIDDLE = 0.6745  # median of a half-normal number over its scale
 _SHARP = 0.01
 """Relative error assumed for all observations when the number of parameters that a quantity constrains is counted."""
 LEAST_ERROR = 1e-3
@@ -58,19 +53,14 @@ class LeastSquares:
 
     z: Samples
     covariance: Samples
-    discrepancy: dict[Quantity, float]
-    """Relative misfit from robot to robot beyond the trials' scatter."""
-    error: dict[Quantity, float]
-    """Relative error of one trial; NaN without repeated trials."""
+    discrepancy: dict[Quantity, float]  #: Relative misfit from robot to robot beyond the trials' scatter.
+    error: dict[Quantity, float]  #: Relative error of one trial; NaN without repeated trials.
     chi2: float
     """Sum of squared residuals of the fit without discrepancy, over the errors of trials and their floor; NaN where
     trials' errors are neither seen nor stated."""
-    freedom: int
-    """Observed means less free numbers."""
-    left: dict[Quantity, float]
-    """Degrees of freedom that the fit leaves each quantity."""
-    residuals: dict[Quantity, Samples]
-    """Observed over predicted less one, robot by robot."""
+    freedom: int  #: Observed means less free numbers.
+    left: dict[Quantity, float]  #: Degrees of freedom that the fit leaves each quantity.
+    residuals: dict[Quantity, Samples]  #: Observed over predicted less one, robot by robot.
 
 
 def sensitivities(problem: Problem, z: Samples) -> dict[Quantity, Samples]:
@@ -357,12 +347,10 @@ _FACTORS = ("body_drag", "body_rotation")
 class PaperFit:
     """Factors by label, and how they differ from tail to tail."""
 
-    values: dict[str, float]
-    """Factor of each channel."""
+    values: dict[str, float]  #: Factor of each channel.
     by_robot: dict[str, Samples]
     """The factor that each robot alone would give, by parameter; NaN where it was not observed."""
-    spread: dict[str, float]
-    """Standard deviation of these within a channel, by label; NaN for a single robot."""
+    spread: dict[str, float]  #: Standard deviation of these within a channel, by label; NaN for a single robot.
 
 
 def paper_fit(problem: Problem) -> PaperFit:

@@ -28,10 +28,8 @@ ERROR_SCALE = 0.05
 """Scale of the half-normal prior of a trial's relative error: more than a tenth would be a poor measurement."""
 LEAST_RELATIVE = 1e-4
 """Relative error below which no mean is taken for known: observations are written with a few digits."""
-_NOTHING = -1e30
-"""Log density where there is none: finite, for the sampler takes differences."""
-_LARGEST = 8.0
-"""Coordinates beyond this many standard deviations of the prior have no density."""
+_NOTHING = -1e30  # log density where there is none: finite, for the sampler takes differences
+_LARGEST = 8.0  # coordinates beyond this many standard deviations of the prior have no density
 
 
 def half_normal(z: Samples, scale: float) -> Samples:

@@ -11,10 +11,8 @@ from spirillum.measurement.observations import ObservationRow
 from spirillum.notes import Note
 from spirillum.robust import mad_scale
 
-_LIMIT = 8.0
-"""Robust standard deviations, pooled over all trials, beyond which a trial is an outlier."""
-_LEAST = 0.15
-"""Relative deviation below which no trial is an outlier."""
+_LIMIT = 8.0  # robust standard deviations, pooled over all trials, beyond which a trial is an outlier
+_LEAST = 0.15  # relative deviation below which no trial is an outlier
 _FEWEST = 3
 _COLUMNS = ("forward_velocity_mm_s", "body_rate_Hz")
 

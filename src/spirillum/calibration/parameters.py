@@ -73,8 +73,7 @@ class Uniform:
         return f"{kind} from {self.low:.3g} to {self.high:.3g} {unit}".rstrip()
 
 
-Prior = LogNormal | Uniform
-"""A prior as a map from a standard normal coordinate."""
+Prior = LogNormal | Uniform  #: A prior as a map from a standard normal coordinate.
 
 
 @dataclass(frozen=True)
@@ -83,15 +82,12 @@ class FitParameter:
 
     name: str
     meaning: str
-    reason: str
-    """Why its prior is as it is."""
+    reason: str  #: Why its prior is as it is.
     unit: str = ""
     scope: Literal["channel", "all", "tail"] = "all"
     """One value for each channel, one for all, or (friction only) one for each tail."""
-    models: tuple[str, ...] = tuple(SWIMMER_MODELS)
-    """Models that have it."""
-    needs_motor: bool = False
-    """Whether it acts on the motor's rate, so that the motor has to be predicted."""
+    models: tuple[str, ...] = tuple(SWIMMER_MODELS)  #: Models that have it.
+    needs_motor: bool = False  #: Whether it acts on the motor's rate, so that the motor has to be predicted.
 
 
 _AS_MOTORS_SCATTER = "around the robot's own value, 95 % within 20 %, as small motors scatter"
@@ -182,8 +178,7 @@ _LISTED = (
         models=("tube",),
     ),
 )
-PARAMETERS: dict[str, FitParameter] = {parameter.name: parameter for parameter in _LISTED}
-"""All parameters by name."""
+PARAMETERS: dict[str, FitParameter] = {parameter.name: parameter for parameter in _LISTED}  #: All parameters by name.
 
 UNWALLED = "sbt"
 """Model that is fitted where `auto` cannot take one with walls: the paper's, with factors on the body's drag."""
@@ -211,10 +206,8 @@ class Coordinate:
     """One free number of a fit."""
 
     parameter: FitParameter
-    channel: int | None
-    """Index of its channel; None for all."""
-    label: str
-    """Name, with the channel where there are several."""
+    channel: int | None  #: Index of its channel; None for all.
+    label: str  #: Name, with the channel where there are several.
     prior: Prior
 
 
@@ -266,8 +259,7 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
     return names
 
 
-OBSERVED = ("tail.wavelength", "tail.amplitude")
-"""Fields whose values are given by the observations."""
+OBSERVED = ("tail.wavelength", "tail.amplitude")  #: Fields whose values are given by the observations.
 _IN_PLACE_OF = {
     "body_drag": "calibration.{model}.body_drag",
     "body_rotation": "calibration.{model}.body_rotation",
@@ -332,8 +324,7 @@ def _share(field: str, share: str | float) -> float:
     return value
 
 
-LEVEL = 0.95
-"""Level of all intervals."""
+LEVEL = 0.95  #: Level of all intervals.
 
 
 @dataclass(frozen=True)

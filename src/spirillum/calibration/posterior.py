@@ -20,10 +20,8 @@ from spirillum.calibration.likelihood import DISCREPANCY_SCALE, ERROR_SCALE, Den
 from spirillum.calibration.problem import Problem, Progress
 from spirillum.errors import InputError, check_range
 
-LARGEST_RHAT = 1.01
-"""Largest R-hat (rank-normalised, split) of a posterior that may be used."""
-FEWEST_EFFECTIVE = 400.0
-"""Smallest effective sample size, of bulk and tails."""
+LARGEST_RHAT = 1.01  #: Largest R-hat (rank-normalised, split) of a posterior that may be used.
+FEWEST_EFFECTIVE = 400.0  #: Smallest effective sample size, of bulk and tails.
 ENSEMBLES = 4
 _MOST_DOUBLINGS = 10
 
@@ -60,13 +58,10 @@ class Posterior:
     """Draws of all coordinates, and what they are worth."""
 
     density: Density
-    z: Samples
-    """(chains, draws, coordinates); a chain is a walker."""
+    z: Samples  #: (chains, draws, coordinates); a chain is a walker.
     rhat: dict[str, float]
-    effective: dict[str, float]
-    """Smaller of the effective sample sizes of bulk and tails."""
-    steps: int
-    """Steps of each ensemble after warming up."""
+    effective: dict[str, float]  #: Smaller of the effective sample sizes of bulk and tails.
+    steps: int  #: Steps of each ensemble after warming up.
     acceptance: float
 
     @property

@@ -53,8 +53,7 @@ _TOLERANCE_SPREAD = 0.1
 _FRICTION_SPREAD = 1.5
 _LOG_NORMAL = {**_FACTOR_SPREADS, "friction_coefficient": (0.1, 0.8)}
 """Medians of log-normal priors that are the same for all robots, and standard deviations of the logarithm."""
-_REACH = 2.5
-"""Standard deviations of a prior to either side over which trials are made."""
+_REACH = 2.5  # standard deviations of a prior to either side over which trials are made
 _WIRE_POINTS = 9
 _WIRE_RANGE = 5.0  # standard deviations that the table reaches to either side
 
@@ -66,13 +65,11 @@ class Problem:
     experiment: Experiment
     model: SwimmerModel
     free: tuple[str, ...]
-    coordinates: tuple[Coordinate, ...]
-    """Free numbers; friction tail by tail is none, for it follows from the others."""
+    coordinates: tuple[Coordinate, ...]  #: Free numbers; friction tail by tail is none, for it follows from the others.
     forward: Forward
     interpolation_error: float
     """Relative error of interpolated resistances, that no prediction is taken to be better than; 0 without any."""
-    fixed_friction: Samples
-    """B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset."""
+    fixed_friction: Samples  #: B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset.
     trials: TrialSurfaces | None = None
     """Observables of trials, where these are fitted; None for a fit of held motion."""
     assumed: Mapping[str, float] = field(default_factory=dict)

@@ -35,14 +35,10 @@ from spirillum.swimming.released_motion import HELD, RELEASED
 
 _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
-_PARETO = 0.7
-"""Largest shape of the importance weights' tail at which leaving a robot out can be trusted."""
-_MOST_BAD = 0.5
-"""Share of the robots with a larger one above which no model is named the better."""
-_FEWEST_ROBOTS = 4
-"""Below that number a standard error over the robots is chance, and no model is named the better."""
-_MANY_ROBOTS = 10
-"""Below that number the standard error itself is hardly known."""
+_PARETO = 0.7  # largest shape of the importance weights' tail at which leaving a robot out can be trusted
+_MOST_BAD = 0.5  # share of the robots with a larger one above which no model is named the better
+_FEWEST_ROBOTS = 4  # below that number a standard error over the robots is chance, and no model is named the better
+_MANY_ROBOTS = 10  # below that number the standard error itself is hardly known
 _WORST = 3
 _MODELS = ("sbt", "rft")
 _PAPERS_MODELS = "none is named, and the paper compares these two"
@@ -68,17 +64,12 @@ class ModelRank:
     """The rank of one model."""
 
     model: str
-    elpd: float
-    """Expected log density of one left-out robot after another, summed."""
+    elpd: float  #: Expected log density of one left-out robot after another, summed.
     standard_error: float
-    difference: float
-    """Of elpd to the best model; 0 for it."""
-    difference_error: float
-    """Standard error of the difference, over the robots."""
-    pareto: Samples
-    """Shape of the importance weights' tail, robot by robot."""
-    pointwise: Samples
-    """Contribution of each robot."""
+    difference: float  #: Of elpd to the best model; 0 for it.
+    difference_error: float  #: Standard error of the difference, over the robots.
+    pareto: Samples  #: Shape of the importance weights' tail, robot by robot.
+    pointwise: Samples  #: Contribution of each robot.
     fit: Calibrated
 
 
@@ -88,8 +79,7 @@ class Ranking(DisplayMixin):
 
     ranked: tuple[ModelRank, ...]
     warnings: tuple[Note, ...]
-    model_reason: str = ""
-    """Why these models were ranked; empty where they were named."""
+    model_reason: str = ""  #: Why these models were ranked; empty where they were named.
 
     @property
     def best(self) -> ModelRank:

@@ -55,13 +55,10 @@ _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
 _DEFAULT_WAVELENGTHS = (10.0, 15.0, 20.0, 25.0, 30.0)
 _DEFAULT_AMPLITUDES = (1.5, 2.0, 2.5, 3.0, 3.5)
 _MOST = 2000
-_BLOCKS = 20
-"""Blocks of draws, each of which is left out once."""
-_TIED = 2.0
-"""Standard errors within which a candidate is tied with the best one."""
+_BLOCKS = 20  # blocks of draws, each of which is left out once
+_TIED = 2.0  # standard errors within which a candidate is tied with the best one
 _NO_YAWED_TABLE = "it has no table with yawed poses; `spirillum prepare` makes one"
-_SAID = 5
-"""Candidates that are left out by name."""
+_SAID = 5  # candidates that are left out by name
 
 
 @dataclass(frozen=True)
@@ -71,14 +68,11 @@ class CandidateRobot:
     channel_diameter: float
     wavelength: float
     amplitude: float
-    gain: float
-    """Expected information about the fitted numbers, bits."""
+    gain: float  #: Expected information about the fitted numbers, bits.
     narrowing: Mapping[str, float]
     """Expected standard deviation of each number after the measurement over that before."""
-    behind: float = 0.0
-    """Information of the best candidate less that of this one, bits; 0 for the best."""
-    behind_error: float = 0.0
-    """Standard error of that difference, from the finite number of draws, bits."""
+    behind: float = 0.0  #: Information of the best candidate less that of this one, bits; 0 for the best.
+    behind_error: float = 0.0  #: Standard error of that difference, from the finite number of draws, bits.
 
     @property
     def tied(self) -> bool:
@@ -92,8 +86,7 @@ class Suggestion(DisplayMixin):
 
     posterior: PosteriorFile
     trials: int
-    answer: str
-    """Motion of the robots in these trials: `held` or `trial`."""
+    answer: str  #: Motion of the robots in these trials: `held` or `trial`.
     candidates: tuple[CandidateRobot, ...]
     warnings: tuple[Note, ...]
 

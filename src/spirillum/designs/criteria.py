@@ -184,8 +184,7 @@ class Manufacturability(Options):
         ]
 
 
-TURNS = "tail.turns"
-"""Whole turns of the tail: its length over its wavelength, a field of designs only."""
+TURNS = "tail.turns"  #: Whole turns of the tail: its length over its wavelength, a field of designs only.
 _MOST_TURNS = 100
 _MOST_VARIABLES = 8
 _MAY_BE_UNSET = "friction.effective"
@@ -194,10 +193,8 @@ _MAY_BE_UNSET = "friction.effective"
 class Variable(NamedTuple):
     """A field with the range from which a design chooses it; SI."""
 
-    path: str
-    """Dotted field of the robot file, or `tail.turns`."""
-    unit: str
-    """SI unit."""
+    path: str  #: Dotted field of the robot file, or `tail.turns`.
+    unit: str  #: SI unit.
     low: float
     high: float
 

@@ -29,15 +29,11 @@ from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stok
 from spirillum.swimming.steady import LEVEL, STEADY, Swimming, friction_reading
 from spirillum.units import KINDS, parse_option, show
 
-_MORE_DRAWS = 4
-"""Draws of what is stated over those of the search."""
-_SETS = 16
-"""Independent sets of these draws, from which the interval of a probability follows."""
+_MORE_DRAWS = 4  # draws of what is stated over those of the search
+_SETS = 16  # independent sets of these draws, from which the interval of a probability follows
 _FRONT_POINTS = 13
-_MOST_OF_STEP_OUT = 0.95
-"""Share of the step-out rate above which a warning states the margin."""
-_STATED_SEED = 7919
-"""Added to the seed for the draws of what is stated."""
+_MOST_OF_STEP_OUT = 0.95  # share of the step-out rate above which a warning states the margin
+_STATED_SEED = 7919  # added to the seed for the draws of what is stated
 
 Progress = Callable[[str, int, int], None]
 

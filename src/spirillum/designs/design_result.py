@@ -28,19 +28,13 @@ _LANDSCAPE_POINTS = 41
 class Alternative:
     """A design to compare with; SI."""
 
-    name: str
-    """`today` or `runner_up`."""
-    values: Mapping[str, float]
-    """Fields with their values."""
+    name: str  #: `today` or `runner_up`.
+    values: Mapping[str, float]  #: Fields with their values.
     objective: float
-    beaten: float
-    """Share of the draws in which the best design is better; without unknowns 0 or 1."""
-    beaten_low: float
-    """Lower end of the 95 % interval of that probability, from the finite number of draws."""
-    beaten_high: float
-    """Upper end."""
-    keeps: bool
-    """Whether it can be built and keeps all conditions."""
+    beaten: float  #: Share of the draws in which the best design is better; without unknowns 0 or 1.
+    beaten_low: float  #: Lower end of the 95 % interval of that probability, from the finite number of draws.
+    beaten_high: float  #: Upper end.
+    keeps: bool  #: Whether it can be built and keeps all conditions.
 
 
 @dataclass(frozen=True)
@@ -49,26 +43,19 @@ class ObjectiveProfile:
 
     path: str
     unit: str
-    values: Samples
-    """Of the variable, (points,)."""
-    objective: Samples
-    """(points,); NaN where a design is refused or breaks a condition."""
-    low: float
-    """Least value at which the objective is within one per cent of the best."""
-    high: float
-    """Largest such value."""
-    binds: str
-    """What ends the range that is allowed, beside the best value; empty where nothing does."""
+    values: Samples  #: Of the variable, (points,).
+    objective: Samples  #: (points,); NaN where a design is refused or breaks a condition.
+    low: float  #: Least value at which the objective is within one per cent of the best.
+    high: float  #: Largest such value.
+    binds: str  #: What ends the range that is allowed, beside the best value; empty where nothing does.
 
 
 @dataclass(frozen=True)
 class Uncertainty:
     """What the unknowns make of the best design."""
 
-    draws: int
-    """Number of draws from which it is stated; none of them was used in the search."""
-    low: Mapping[str, float]
-    """Lower ends of the 95 % intervals of all quantities, SI."""
+    draws: int  #: Number of draws from which it is stated; none of them was used in the search.
+    low: Mapping[str, float]  #: Lower ends of the 95 % intervals of all quantities, SI.
     high: Mapping[str, float]
     probability: tuple[float, float, float] | None
     """Probability that the target is met, with its 95 % interval; None without a target."""
@@ -79,10 +66,8 @@ class Uncertainty:
 class Learned(NamedTuple):
     """How well a model that is learned is known where the best design is."""
 
-    solves: int
-    """Designs around which the flow was solved for."""
-    last: float
-    """Relative difference of the objective of the best design, learned and then solved."""
+    solves: int  #: Designs around which the flow was solved for.
+    last: float  #: Relative difference of the objective of the best design, learned and then solved.
     left_out: float
     """Root mean square error of the objective of the better half of the solved designs, each learned from the others,
     relative."""
@@ -92,20 +77,15 @@ class Learned(NamedTuple):
 class Design(DisplayMixin):
     """The best values of some fields of a robot, SI."""
 
-    robot: Robot
-    """The robot with the best values."""
-    today: Robot = field(repr=False)
-    """The robot as it was given."""
+    robot: Robot  #: The robot with the best values.
+    today: Robot = field(repr=False)  #: The robot as it was given.
     model: str
     objectives: tuple[Objective, ...] = field(repr=False)
     conditions: tuple[str, ...]
-    values: Mapping[str, float]
-    """Fields with their best values."""
+    values: Mapping[str, float]  #: Fields with their best values.
     units: Mapping[str, str] = field(repr=False)
-    objective: float
-    """The objective of the best design, from draws that were not used in the search."""
-    quantities: Mapping[str, float] = field(repr=False)
-    """Every quantity of steady swimming, its mean over the draws."""
+    objective: float  #: The objective of the best design, from draws that were not used in the search.
+    quantities: Mapping[str, float] = field(repr=False)  #: Every quantity of steady swimming, its mean over the draws.
     uncertainty: Uncertainty | None
     alternatives: tuple[Alternative, ...]
     profiles: tuple[ObjectiveProfile, ...] = field(repr=False)
@@ -113,20 +93,17 @@ class Design(DisplayMixin):
     """With two objectives, designs of which none is better in both: fields and both objectives, (points,)."""
     searched: Evaluation = field(repr=False, compare=False)
     """Designs under the draws of the search, for further analysis."""
-    bound_by: tuple[str, ...]
-    """What the best design touches: ends of ranges and conditions."""
+    bound_by: tuple[str, ...]  #: What the best design touches: ends of ranges and conditions.
     swum: int
     refused: int
     breaking: int
     warnings: tuple[Note, ...]
     learned: Learned | None = None
     """Accuracy of a model that solves for the flow; None where it was evaluated for every design."""
-    model_reason: str = ""
-    """Reason of the model, in half a sentence; empty where it was named."""
+    model_reason: str = ""  #: Reason of the model, in half a sentence; empty where it was named.
     leading: tuple[Samples, ...] = field(default=(), repr=False)
     """The best design and the next ones, at least a tenth of a range apart: positions in the ranges, (variables,)."""
-    confirmed: tuple[ConfirmedDesign, ...] = ()
-    """Trials of these, by `tube`; none for other models."""
+    confirmed: tuple[ConfirmedDesign, ...] = ()  #: Trials of these, by `tube`; none for other models.
 
     @property
     def calibrated(self) -> bool:
@@ -237,10 +214,8 @@ class Design(DisplayMixin):
 
 _PROFILE_POINTS = 41
 _HALVINGS = 12
-_FLAT = 0.01
-"""Loss of the objective up to which a variable is free, relative."""
-_TOUCHES = 1e-3
-"""Share of a range, or relative excess of a constraint, within which the best design is at its bound."""
+_FLAT = 0.01  # loss of the objective up to which a variable is free, relative
+_TOUCHES = 1e-3  # share of a range, or relative excess of a constraint, within which the best design is at its bound
 
 
 def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectiveProfile:
@@ -316,8 +291,7 @@ def bound_by_of(stated: Evaluation, best: Samples, profiles: Sequence[ObjectiveP
     return (*found, *dict.fromkeys(item.binds for item in profiles if item.binds))
 
 
-_ALIKE = 1e-9
-"""Relative range of an objective below which it does not change."""
+_ALIKE = 1e-9  # relative range of an objective below which it does not change
 ALTERNATIVES = {
     "today": "today's design",
     "runner_up": "the best of the designs that differ by a tenth of a range or more",

@@ -27,10 +27,8 @@ from spirillum.swimming.steady import Swimming, requirements, swim
 class SampledRobots(NamedTuple):
     """Robots that differ in what is not known."""
 
-    batch: RobotBatch
-    """A robot for each draw, or one robot where everything is known."""
-    values: Mapping[str, Samples]
-    """Unknown to its values, (draws,)."""
+    batch: RobotBatch  #: A robot for each draw, or one robot where everything is known.
+    values: Mapping[str, Samples]  #: Unknown to its values, (draws,).
     number: int
     sets: int = 1
     """Number of sets that fill the ranges evenly, each by itself and independent of the others, one after the other."""
@@ -40,12 +38,9 @@ class SampledRobots(NamedTuple):
 class Unknowns:
     """Ranges, or a posterior, of what is not known of a robot."""
 
-    robot: Robot
-    """With the posterior median in place of its own values."""
-    ranges: tuple[Variable, ...] = ()
-    """Fields with the ranges over which they are uniform and independent."""
-    fit: Fit = NO_FIT
-    """The fit whose draws are unknown."""
+    robot: Robot  #: With the posterior median in place of its own values.
+    ranges: tuple[Variable, ...] = ()  #: Fields with the ranges over which they are uniform and independent.
+    fit: Fit = NO_FIT  #: The fit whose draws are unknown.
 
     @property
     def posterior(self) -> PosteriorFile | None:
@@ -102,11 +97,9 @@ def unknowns_of(
 
 REFUSED = 1e6
 """Score of a design that cannot be built, to which what it breaks is added: worse than any condition that is broken."""
-BROKEN = 1e3
-"""Score of a design that breaks a condition, to which the excess is added: worse than any that keeps all."""
+BROKEN = 1e3  #: Score of a design that breaks a condition, to which the excess is added: worse than any that keeps all.
 _MOST = 1e2
-_TIE = 1e-6
-"""Weight of the mean excess beside a probability, which does not change between neighbouring designs."""
+_TIE = 1e-6  # weight of the mean excess beside a probability, which does not change between neighbouring designs
 
 Statistic = Literal["mean", "quantile", "probability"]
 
@@ -116,13 +109,10 @@ class Objective:
     """What is best: a quantity, largest or least, by a statistic of its draws."""
 
     quantity: Quantity
-    sign: float
-    """+1 where more is better, -1 where less is."""
+    sign: float  #: +1 where more is better, -1 where less is.
     statistic: Statistic = "mean"
-    level: float = 0.1
-    """Of the statistic `quantile`: the share of the draws that are worse."""
-    target: Condition | None = None
-    """Of the statistic `probability`: what is to be kept."""
+    level: float = 0.1  #: Of the statistic `quantile`: the share of the draws that are worse.
+    target: Condition | None = None  #: Of the statistic `probability`: what is to be kept.
 
     def of(self, values: Samples) -> Samples:
         """The statistic, (designs,), of a quantity's values, (designs, draws); NaN where a draw has none."""
@@ -165,12 +155,10 @@ class Objective:
 class DesignScores(NamedTuple):
     """What some designs are worth."""
 
-    cost: Samples
-    """To be minimised by one objective, what is broken added, (objectives, designs)."""
+    cost: Samples  #: To be minimised by one objective, what is broken added, (objectives, designs).
     values: Samples
     """Statistic of every objective; NaN for a design that is refused or breaks a condition, (objectives, designs)."""
-    refused: Flags
-    """Whether a design cannot be built or has no answer, (designs,)."""
+    refused: Flags  #: Whether a design cannot be built or has no answer, (designs,).
 
 
 @dataclass(frozen=True)
@@ -183,10 +171,8 @@ class Evaluation:
     conditions: tuple[Condition, ...]
     manufacturability: Manufacturability
     samples: SampledRobots
-    confidence: float
-    """Share of the draws that must satisfy a condition."""
-    tail_rate: float | None = None
-    """Prescribed rate of the tail, rad/s; None: the robot's own drive."""
+    confidence: float  #: Share of the draws that must satisfy a condition.
+    tail_rate: float | None = None  #: Prescribed rate of the tail, rad/s; None: the robot's own drive.
 
     def motion(self, shares: Samples | None) -> Swimming:
         """Every design under every draw, the draws of one design one after the other; None: the robot as it is."""

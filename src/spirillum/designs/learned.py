@@ -41,8 +41,7 @@ _COLUMNS = {
     "tail.length": "tail_length",
     "tail.wire_diameter": "wire_diameter",
 }
-_FREE = ("fluid.", "friction.", "motor.", "battery.", "drive.")
-"""Fields that the correction does not depend on."""
+_FREE = ("fluid.", "friction.", "motor.", "battery.", "drive.")  # fields that the correction does not depend on
 _MOST_FIELDS = 3
 _UPPER = np.triu_indices(3)
 _PLACES = np.array([0, 1, 3])
@@ -53,12 +52,9 @@ _PLACES = np.array([0, 1, 3])
 class Points:
     """Designs at which the flow was solved for."""
 
-    variables: tuple[Variable, ...]
-    """Fields of the tail that are varied."""
-    features: Samples
-    """Positions of the designs in their ranges, (points, fields)."""
-    logarithms: Samples
-    """Upper triangle of log C, (points, 6)."""
+    variables: tuple[Variable, ...]  #: Fields of the tail that are varied.
+    features: Samples  #: Positions of the designs in their ranges, (points, fields).
+    logarithms: Samples  #: Upper triangle of log C, (points, 6).
 
     def without(self, number: int) -> Points:
         """All points but one."""
@@ -273,8 +269,7 @@ def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variab
     return own
 
 
-_AGREES = 2e-3
-"""Relative difference of the objective, learned and solved, at which the search ends."""
+_AGREES = 2e-3  # relative difference of the objective, learned and solved, at which the search ends
 _ROUNDS = 5
 _CANDIDATES = 64
 _FEWEST, _FOR_EACH = 4, 3

@@ -24,15 +24,12 @@ from spirillum.swimming.released_motion import ReleasedMotion
 
 Progress = Callable[[str, int, int], None]
 _GENERATIONS = 60
-_POPULATION = 12
-"""Designs of a generation for each variable."""
+_POPULATION = 12  # designs of a generation for each variable
 _FEWEST = 24
 _CONVERGED = 1e-3
-_SAME = 1e-3
-"""Share of a range within which two designs of a front are one."""
+_SAME = 1e-3  # share of a range within which two designs of a front are one
 _REFINED = {"xatol": 1e-5, "fatol": 1e-12, "adaptive": True}
-_STEPS, _STEPS_ON_FRONT = 400, 80
-"""Designs that the refinement may swim."""
+_STEPS, _STEPS_ON_FRONT = 400, 80  # designs that the refinement may swim
 
 
 @dataclass
@@ -42,10 +39,8 @@ class Archive:
     shares: list[Samples] = field(default_factory=list)
     values: list[Samples] = field(default_factory=list)
     """Statistic of every objective; NaN where a design is refused or breaks a condition."""
-    refused: int = 0
-    """Designs that cannot be built or have no answer."""
-    breaking: int = 0
-    """Designs that break a condition."""
+    refused: int = 0  #: Designs that cannot be built or have no answer.
+    breaking: int = 0  #: Designs that break a condition.
 
     def keep(self, shares: Samples, values: Samples, refused: Flags) -> None:
         """Keep some designs."""
@@ -68,11 +63,9 @@ class Archive:
 class Found:
     """The end of one search."""
 
-    shares: Samples
-    """The best design, (variables,)."""
+    shares: Samples  #: The best design, (variables,).
     cost: float
-    possible: bool
-    """Whether it can be built and keeps all conditions."""
+    possible: bool  #: Whether it can be built and keeps all conditions.
 
 
 def best_design(
@@ -192,21 +185,17 @@ def _undominated(evaluation: Evaluation, shares: Samples) -> Samples:
     return kept[apart]
 
 
-CONFIRMED = 3
-"""Designs that are confirmed."""
-NEAR = 0.1
-"""Designs that are compared differ from each other by at least this share of a range."""
+CONFIRMED = 3  #: Designs that are confirmed.
+NEAR = 0.1  #: Designs that are compared differ from each other by at least this share of a range.
 
 
 @dataclass(frozen=True)
 class ConfirmedDesign:
     """One of the best designs with what it does in a trial."""
 
-    shares: Samples
-    """Its position in the ranges that are searched, (variables,)."""
+    shares: Samples  #: Its position in the ranges that are searched, (variables,).
     robot: Robot
-    held: float
-    """Forward velocity held at its pose, m/s; NaN where that would have to be solved for."""
+    held: float  #: Forward velocity held at its pose, m/s; NaN where that would have to be solved for.
     trial: ReleasedMotion
 
 

@@ -30,8 +30,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, with_numbers
 
 _WHAT = "a calibration file (TOML with [calibration.<model>] tables)"
-_SAME = 1e-6
-"""Relative difference up to which two geometries are the same."""
+_SAME = 1e-6  # relative difference up to which two geometries are the same
 
 _Word = Annotated[Text, Field(max_length=500)]
 
@@ -228,8 +227,7 @@ def _alike(value: float, fitted: float) -> bool:
     return abs(value - fitted) <= _SAME * fitted
 
 
-_OPEN = 1e3
-"""Diameter that represents an unbounded fluid, m: the widest channel is the nearest to it."""
+_OPEN = 1e3  # diameter that represents an unbounded fluid, m: the widest channel is the nearest to it
 
 
 def nearest_channel(robot: Robot, channels: Sequence[float]) -> int:

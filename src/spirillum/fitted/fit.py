@@ -27,8 +27,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
-_COEFFICIENTS = ("normal_factor", "tangential_factor")
-"""Fitted fields that act on `rft` alone."""
+_COEFFICIENTS = ("normal_factor", "tangential_factor")  # fitted fields that act on `rft` alone
 
 FITTED_HELD = Note(
     "fit-other-motion",
@@ -58,18 +57,13 @@ CALIBRATED_HELD = Note(
 class Fit:
     """A calibration file or a posterior, read once; without either, a fit of nothing."""
 
-    friction: tuple[FittedFriction, ...] = ()
-    """B_eff, tail by tail."""
-    reading: str = ""
-    """Friction model with which it was inferred."""
-    synthetic: str = ""
-    """Name of the observations, if they are synthetic."""
-    model: str = ""
-    """Model whose torque B_eff was inferred with."""
+    friction: tuple[FittedFriction, ...] = ()  #: B_eff, tail by tail.
+    reading: str = ""  #: Friction model with which it was inferred.
+    synthetic: str = ""  #: Name of the observations, if they are synthetic.
+    model: str = ""  #: Model whose torque B_eff was inferred with.
     posterior: PosteriorFile | None = None
     file: CalibrationFile | None = None
-    name: str = ""
-    """Name of the file, with the observations of a posterior."""
+    name: str = ""  #: Name of the file, with the observations of a posterior.
     channels: tuple[float, ...] = ()
     """Diameters of the channels in which it was fitted, m; none where the file does not state them."""
     friction_coefficient: float | None = None
@@ -303,8 +297,7 @@ def friction_acts(reading: str, rate: float | None) -> bool:
     return rate is None or reading == "body"
 
 
-NO_FIT = Fit()
-"""The fit of nothing: a robot keeps its own values."""
+NO_FIT = Fit()  #: The fit of nothing: a robot keeps its own values.
 
 
 def read_fit(

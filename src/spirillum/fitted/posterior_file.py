@@ -36,8 +36,7 @@ SCHEMA = "spirillum.posterior/1"
 _DRAWS = 1000
 _WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
 _TAIL = ("channel_diameter", "wavelength", "amplitude")
-_SMALLEST, _GREATEST = 1e-15, 1e12
-"""Of a draw, SI."""
+_SMALLEST, _GREATEST = 1e-15, 1e12  # of a draw, SI
 _LARGEST_DISCREPANCY = 100.0
 _MAY_BE_ZERO = ("pitch",)
 _PLACE = ("gap", "pitch")
@@ -53,26 +52,19 @@ class PosteriorFile:
     observations: str
     synthetic: bool
     channels: tuple[float, ...]
-    body: tuple[float, float]
-    """Diameter and length of the fitted body, m."""
-    draws: Mapping[str, Samples]
-    """Parameter to (draws, channels), or (draws, 1)."""
+    body: tuple[float, float]  #: Diameter and length of the fitted body, m.
+    draws: Mapping[str, Samples]  #: Parameter to (draws, channels), or (draws, 1).
     middle: Mapping[str, Samples]
     """Their medians before thinning, (channels,) or (1,): those of `calibration.toml` too."""
-    discrepancy: Mapping[str, Samples]
-    """Quantity to (draws,)."""
-    error: Mapping[str, Samples]
-    """Relative error of a trial, quantity to (draws,)."""
-    friction: tuple[Mapping[str, float], ...]
-    """B_eff tail by tail, with `low` and `high`."""
-    friction_reading: str = ""
-    """Reading of the friction under which it was inferred."""
+    discrepancy: Mapping[str, Samples]  #: Quantity to (draws,).
+    error: Mapping[str, Samples]  #: Relative error of a trial, quantity to (draws,).
+    friction: tuple[Mapping[str, float], ...]  #: B_eff tail by tail, with `low` and `high`.
+    friction_reading: str = ""  #: Reading of the friction under which it was inferred.
     tails: tuple[Mapping[str, Any], ...] = ()
     """Observations of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`,
     `stated`), `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in
     older files."""
-    answer: str = "held"
-    """Motion that was fitted: `held`, or a `trial`."""
+    answer: str = "held"  #: Motion that was fitted: `held`, or a `trial`.
 
     def measured(self, robot: Robot) -> Mapping[str, Any] | None:
         """What was observed of a robot; None if it was not."""
@@ -234,10 +226,8 @@ class PosteriorFile:
         return found
 
 
-_ALONE = 0.3
-"""Standard deviation of log B_eff from tail to tail where a single tail does not constrain it; assumed."""
-_FACTOR = 20.0
-"""Factor from the median within which B_eff of another tail is assumed."""
+_ALONE = 0.3  # standard deviation of log B_eff from tail to tail where a single tail does not constrain it; assumed
+_FACTOR = 20.0  # factor from the median within which B_eff of another tail is assumed
 
 
 def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generator) -> Samples:

@@ -192,8 +192,7 @@ class CaseValue(NamedTuple):
     """A quantity of a point, in the unit of the case."""
 
     value: float
-    stated_error: float | None
-    """Relative error that the program states; None where it states none."""
+    stated_error: float | None  #: Relative error that the program states; None where it states none.
 
 
 class CaseTrial(NamedTuple):

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 class Paper(NamedTuple):
     """Claims and figures of a paper for a study that names it."""
 
-    claims: Callable[[xr.Dataset], list[Claim]]
-    """Its statements, each with its verdict."""
-    predictions: Callable[[xr.Dataset], list[Claim]]
-    """Its statements with verdicts from released robots."""
+    claims: Callable[[xr.Dataset], list[Claim]]  #: Its statements, each with its verdict.
+    predictions: Callable[[xr.Dataset], list[Claim]]  #: Its statements with verdicts from released robots.
     layout: Mapping[str, PaperFigure]
     figures: Callable[[xr.Dataset], dict[str, Picture]]
 

@@ -42,8 +42,7 @@ class AssumptionEffect:
 
     assumption: str
     value: str
-    ours: float
-    """In the unit of the row."""
+    ours: float  #: In the unit of the row.
 
 
 @dataclass(frozen=True)
@@ -56,18 +55,13 @@ class ValidationRow:
     series: str
     name: str
     quantity: CaseQuantity
-    published: float | None
-    """None where only a trend was published."""
-    uncertainty: float | None
-    """Published, in the same unit; None where none is stated."""
+    published: float | None  #: None where only a trend was published.
+    uncertainty: float | None  #: Published, in the same unit; None where none is stated.
     ours: float
-    stated_error: float | None
-    """Relative error that the program states of its value; None where it states none."""
+    stated_error: float | None  #: Relative error that the program states of its value; None where it states none.
     effects: tuple[AssumptionEffect, ...]
-    computed: bool
-    """Whether ours was computed now; else it is the recorded value, of a run that lacks its table."""
-    recorded: float
-    """The program's value when the case was written."""
+    computed: bool  #: Whether ours was computed now; else it is the recorded value, of a run that lacks its table.
+    recorded: float  #: The program's value when the case was written.
     recorded_within: float
 
     @property
@@ -141,8 +135,7 @@ class RatioSummary:
 
     quantity: str
     mean: float
-    deviation: float
-    """Sample standard deviation; zero for a single row."""
+    deviation: float  #: Sample standard deviation; zero for a single row.
     count: int
     covered: int
 
@@ -155,8 +148,7 @@ class CaseResult:
     case: Case
     rows: tuple[ValidationRow, ...]
     statements: tuple[Claim, ...]
-    read: tuple[Provenance, ...]
-    """How each of the statements was read."""
+    read: tuple[Provenance, ...]  #: How each of the statements was read.
 
     @property
     def summaries(self) -> list[RatioSummary]:
@@ -203,8 +195,7 @@ class Validation(DisplayMixin):
     """Cases with their rows: published, ours, difference, stated error, covered or not."""
 
     cases: tuple[CaseResult, ...]
-    folder: str | None = None
-    """Folder of the report; None without one."""
+    folder: str | None = None  #: Folder of the report; None without one.
 
     @property
     def rows(self) -> tuple[ValidationRow, ...]:

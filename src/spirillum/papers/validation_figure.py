@@ -18,8 +18,7 @@ from spirillum.view.figures.style import COLOURS, PAGE, PATCH, plain
 
 _COLOURS = ("blue", "vermillion", "green", "purple", "orange", "sky", "black")
 _MARKERS = "osD^vPX*"
-_ROW, _LEAST, _CURVE = 0.17, 0.5, 2.2
-"""Height of a row of a panel, least height of a panel, height of curves, inches."""
+_ROW, _LEAST, _CURVE = 0.17, 0.5, 2.2  # height of a row of a panel, least height of a panel, height of curves, inches
 _LONGEST = 56
 _PUBLISHED = "#bbbbbb"
 

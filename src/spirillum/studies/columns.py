@@ -51,10 +51,8 @@ AT_POSES = (
 class BandTask(OneModel):
     """One model for the robots of one channel that share a pose of their bands."""
 
-    pose: int
-    """Index of the pose in the band of each robot."""
-    robots: tuple[RobotBatch, ...]
-    """The robots at that pose, one by one."""
+    pose: int  #: Index of the pose in the band of each robot.
+    robots: tuple[RobotBatch, ...]  #: The robots at that pose, one by one.
 
     needed = frozenset(AT_POSES)
 
@@ -164,14 +162,11 @@ def with_band(
     return found
 
 
-POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")
-"""Pose and contact of a robot, means over a trial."""
-ENDS = ("median", "low", "high")
-"""Of an interval over the unknowns."""
+POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")  #: Pose and contact of a robot, means over a trial.
+ENDS = ("median", "low", "high")  #: Of an interval over the unknowns.
 TRIAL_STATES = ("no-trial", "swimming", "standing")
 """State of a robot in its trial; the index in this list is the value in the dataset."""
-_MOST_HELD = 1000
-"""Robots of a study that are computed by `tube` without a request."""
+_MOST_HELD = 1000  # robots of a study that are computed by `tube` without a request
 
 
 @dataclass(frozen=True)

@@ -121,14 +121,10 @@ _BAND = {
 class BesideModels(NamedTuple):
     """Answers of robots one by one, beside those of the models."""
 
-    released: Sequence[tuple[ReleaseTask, Part]] = ()
-    """Of robots that made the runs of a design."""
-    settled: Sequence[tuple[SettledTask, Part]] = ()
-    """Of those that were followed to their steady motions."""
-    held: Sequence[tuple[HeldTask, Part]] = ()
-    """Of those that `tube` holds, in a study without that model."""
-    trials: Sequence[tuple[TrialTask, Part]] = ()
-    """Of those that made a trial."""
+    released: Sequence[tuple[ReleaseTask, Part]] = ()  #: Of robots that made the runs of a design.
+    settled: Sequence[tuple[SettledTask, Part]] = ()  #: Of those that were followed to their steady motions.
+    held: Sequence[tuple[HeldTask, Part]] = ()  #: Of those that `tube` holds, in a study without that model.
+    trials: Sequence[tuple[TrialTask, Part]] = ()  #: Of those that made a trial.
 
 
 _NOTHING_BESIDE = BesideModels()
@@ -200,8 +196,7 @@ def laid_out(
     return xr.Dataset(data, coords=coordinates)
 
 
-_ANY = "surrogatepass"
-"""Damaged names are summed, too."""
+_ANY = "surrogatepass"  # damaged names are summed, too
 
 
 def checksum_of(dataset: xr.Dataset) -> str:
@@ -332,10 +327,8 @@ class Caution(NamedTuple):
     model: str
     flag: str
     robots: int
-    sentence: str
-    """The first of them in words."""
-    refused: bool = False
-    """Whether they have no answer for it."""
+    sentence: str  #: The first of them in words.
+    refused: bool = False  #: Whether they have no answer for it.
 
 
 def _refusals(task: ModelTask, part: Part) -> list[Caution]:

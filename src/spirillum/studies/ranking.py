@@ -27,35 +27,27 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _ALIKE = 0.01
-_EQUAL = 1e-9
-"""Relative difference up to which two robots have one value: rounding."""
-_NAMED = 3
-"""Robots that are named where several are equal."""
-_MOST = 1000
-"""Robots in an answer."""
+_EQUAL = 1e-9  # relative difference up to which two robots have one value: rounding
+_NAMED = 3  # robots that are named where several are equal
+_MOST = 1000  # robots in an answer
 
 
 class QuantityRanking(NamedTuple):
     """How a quantity ranks robots."""
 
-    title: str
-    """Its name in tables and figures."""
-    superlative: str
-    """What the best robot is by it."""
-    sign: float
-    """1 where the largest value is the best, -1 where the least is."""
+    title: str  #: Its name in tables and figures.
+    superlative: str  #: What the best robot is by it.
+    sign: float  #: 1 where the largest value is the best, -1 where the least is.
 
     def heading(self, unit: str) -> str:
         """Title and unit of a column or an axis."""
         return f"{self.title}, {unit}".removesuffix(", 1")
 
 
-STEADY_SPEED = "forward_velocity_settled"
-"""The speed in steady motion after release."""
+STEADY_SPEED = "forward_velocity_settled"  #: The speed in steady motion after release.
 HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"
 """The speed by `tube` where no model of the study computes walls, and that of a trial."""
-_BESIDE = (HELD, TRIAL, STEADY_SPEED)
-"""Speeds beside that of a model, where the study has them."""
+_BESIDE = (HELD, TRIAL, STEADY_SPEED)  # speeds beside that of a model, where the study has them
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
     HELD: QuantityRanking("tube", "fastest at a fixed pose by tube", 1.0),
@@ -83,11 +75,9 @@ class RankedRobot(NamedTuple):
     """A robot of a study with the quantities that rank it, SI; NaN for what does not apply."""
 
     name: str
-    place: int
-    """Its index in the flat order of the study."""
+    place: int  #: Its index in the flat order of the study.
     values: Mapping[str, float]
-    low: Mapping[str, float]
-    """Least values of bands or lower limits of intervals; NaN without one."""
+    low: Mapping[str, float]  #: Least values of bands or lower limits of intervals; NaN without one.
     high: Mapping[str, float]
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,24 +95,19 @@ class RankedRobot(NamedTuple):
 class Best(NamedTuple):
     """The best robot by one quantity."""
 
-    what: str
-    """`fastest`, `most efficient`, `least current` or `least power`."""
+    what: str  #: `fastest`, `most efficient`, `least current` or `least power`.
     quantity: str
     robot: RankedRobot
-    places: int
-    """Number of poses, the reference pose one of them, at which it is the best; 0 without a band."""
-    of_places: int
-    """Number of poses at which the robots have answers."""
+    places: int  #: Number of poses, the reference pose one of them, at which it is the best; 0 without a band.
+    of_places: int  #: Number of poses at which the robots have answers.
     spread: float
     """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
     known: int
     robots: int
-    ties: tuple[str, ...] = ()
-    """Names of the other robots that have the same value, to rounding."""
+    ties: tuple[str, ...] = ()  #: Names of the other robots that have the same value, to rounding.
     lead: float = np.nan
     """Of a speed: by how much it leads the next one, over its own value; NaN alone, or where an error is not known."""
-    error: float = np.nan
-    """Error of the model in that speed, relative."""
+    error: float = np.nan  #: Error of the model in that speed, relative.
 
     @property
     def alike(self) -> bool:
@@ -146,16 +131,12 @@ class StudyRanking:
 
     model: str
     friction: str
-    walls: bool
-    """Whether the walls of a channel that robots are in are left out."""
+    walls: bool  #: Whether the walls of a channel that robots are in are left out.
     held: bool
     """Whether they are ordered by the speed held at a pose in a tube, in which a released robot swims otherwise."""
-    kind: str
-    """What low and high are: `band`, `interval`, or empty where there are none."""
-    robots: tuple[RankedRobot, ...]
-    """Robots that have an answer, the fastest first."""
-    best: tuple[Best, ...]
-    """The best of them by each quantity."""
+    kind: str  #: What low and high are: `band`, `interval`, or empty where there are none.
+    robots: tuple[RankedRobot, ...]  #: Robots that have an answer, the fastest first.
+    best: tuple[Best, ...]  #: The best of them by each quantity.
 
     @property
     def message(self) -> str:

@@ -37,10 +37,8 @@ class RobotBlock(NamedTuple):
     """A block of robots."""
 
     number: int
-    start: tuple[int, ...]
-    """First index along each dimension of the robots."""
-    stop: tuple[int, ...]
-    """First index behind it."""
+    start: tuple[int, ...]  #: First index along each dimension of the robots.
+    stop: tuple[int, ...]  #: First index behind it.
 
     @property
     def size(self) -> int:
@@ -57,8 +55,7 @@ class RobotBlock(NamedTuple):
 class Layout:
     """How a study is cut."""
 
-    dimensions: tuple[str, ...]
-    """Of the robots, as in the dataset."""
+    dimensions: tuple[str, ...]  #: Of the robots, as in the dataset.
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
 
@@ -116,8 +113,7 @@ def cut(
     return own, None if observed is None else observed_at(observed, layout.indices(region))
 
 
-_LAST = "outside"
-"""The variable whose chunk is written last: it marks a complete region."""
+_LAST = "outside"  # the variable whose chunk is written last: it marks a complete region
 
 
 class Plan(NamedTuple):
@@ -125,10 +121,8 @@ class Plan(NamedTuple):
 
     layout: Layout
     variables: Mapping[str, Stored]
-    coordinates: Mapping[str, np.ndarray[Any, Any]]
-    """Variables that it holds whole."""
-    others: tuple[str, ...]
-    """Coordinates that are no dimension."""
+    coordinates: Mapping[str, np.ndarray[Any, Any]]  #: Variables that it holds whole.
+    others: tuple[str, ...]  #: Coordinates that are no dimension.
 
     @property
     def regional(self) -> tuple[str, ...]:
@@ -160,11 +154,9 @@ class RegionJob(NamedTuple):
     """A region with all that it is computed from."""
 
     region: RobotBlock
-    loaded: LoadedStudy
-    """The study of its robots."""
+    loaded: LoadedStudy  #: The study of its robots.
     observed: ObservedArrays | None
-    plan: Plan
-    """Without values."""
+    plan: Plan  #: Without values.
 
 
 def plan_of(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout) -> Plan:
@@ -237,10 +229,8 @@ def encoded_region(job: RegionJob) -> dict[str, bytes]:
     return {key: files[key] for key in plan.pieces(region)}
 
 
-_FEW, _MORE = 200, 2000
-"""Robots that are computed to estimate the memory of the rest."""
-_SOLVING_MEMORY = 5e8
-"""Of a solve of body and walls, bytes; measured for the paper's robot."""
+_FEW, _MORE = 200, 2000  # robots that are computed to estimate the memory of the rest
+_SOLVING_MEMORY = 5e8  # of a solve of body and walls, bytes; measured for the paper's robot
 
 
 _ROUNDS, _LEAST_TIME = 3, 2.0
@@ -275,10 +265,8 @@ class CostEstimate(NamedTuple):
     """What a study takes beside its time."""
 
     results: int
-    memory: float
-    """Most that all processes of this machine take together, bytes."""
-    disk: float
-    """Of the results before compression, bytes."""
+    memory: float  #: Most that all processes of this machine take together, bytes.
+    disk: float  #: Of the results before compression, bytes.
     workers: int
 
     def words(self, seconds: float) -> str:
@@ -296,8 +284,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
-_LARGE = 20_000
-"""Robots in closed form below which a study takes less time than its estimate."""
+_LARGE = 20_000  # robots in closed form below which a study takes less time than its estimate
 
 
 def is_large(loaded: LoadedStudy) -> bool:
@@ -308,8 +295,7 @@ def is_large(loaded: LoadedStudy) -> bool:
 
 class _Cost(NamedTuple):
     memory: float
-    encoded: float
-    """Size of a region's files, bytes."""
+    encoded: float  #: Size of a region's files, bytes.
 
 
 def estimate_of(

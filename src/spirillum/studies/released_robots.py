@@ -74,18 +74,14 @@ def main_effects(values: Values, levels: Levels) -> Values:
     return found
 
 
-FACTORS = ("gap", "pitch", "wait", "roughness", "friction_coefficient")
-"""What differs between the runs of a robot."""
+FACTORS = ("gap", "pitch", "wait", "roughness", "friction_coefficient")  #: What differs between the runs of a robot.
 WINDOWS = ("three turns", "whole run")
 """What a run is read over: the last two of the tail's first three turns, or the last two thirds of it all."""
-READ = (*FACTORS, "window")
-"""What differs between the readings of a robot."""
-AT_RUNS = (*MOVING, "azimuth", "contact_share")
-"""Quantities of each run and window."""
+READ = (*FACTORS, "window")  #: What differs between the readings of a robot.
+AT_RUNS = (*MOVING, "azimuth", "contact_share")  #: Quantities of each run and window.
 INFERRED = ("effective_friction", "body_drag_factor", "modelled_forward_velocity", "modelled_body_rotation_rate")
 """What the paper's models make of the rates of a run."""
-INFERRED_BY = ("sbt", "rft")
-"""The paper's models, each with the robot's own calibration."""
+INFERRED_BY = ("sbt", "rft")  #: The paper's models, each with the robot's own calibration.
 _SAMPLES_PER_TURN = 40
 
 
@@ -246,10 +242,8 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
     return [Note("without-answer", words, ("laid_down",))]
 
 
-SETTLED = (*MOVING, "shaft_power", "hydrodynamic_efficiency")
-"""Quantities of a steady motion."""
-POSE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
-"""Pose of a robot in it, and its time constant."""
+SETTLED = (*MOVING, "shaft_power", "hydrodynamic_efficiency")  #: Quantities of a steady motion.
+POSE = ("gap", "pitch", "yaw", "azimuth", "approach_time")  #: Pose of a robot in it, and its time constant.
 SETTLED_STATES = ("not followed", *get_args(State))
 """Outcome for a robot; the index in this list is the value in the dataset."""
 
@@ -258,10 +252,8 @@ SETTLED_STATES = ("not followed", *get_args(State))
 class SettledTask(OneRobot):
     """One released robot."""
 
-    placement: Placement
-    """Its initial pose."""
-    contact: Contact
-    """What it rests on."""
+    placement: Placement  #: Its initial pose.
+    contact: Contact  #: What it rests on.
 
     needed = frozenset({*SETTLED, *POSE, "error_estimate", "near", "state"})
 

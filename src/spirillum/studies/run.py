@@ -70,8 +70,7 @@ def keep(task: StudyTask, part: Part, folder: Path | None) -> None:
             np.savez(stream, **cast("dict[str, Any]", part))
 
 
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, steps done and steps in all."""
+Progress = Callable[[str, int, int], None]  #: Called with what is being done, steps done and steps in all.
 
 
 def study_fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
@@ -143,8 +142,7 @@ def computed_study(
 
 
 _KEPT = "; what was answered is kept"
-_SHORT = 600_000
-"""Robots in closed form below which other processes would start longer than they work."""
+_SHORT = 600_000  # robots in closed form below which other processes would start longer than they work
 
 
 def _worth(missing: Sequence[StudyTask], pool: WorkerPool) -> WorkerPool:
@@ -256,8 +254,7 @@ def _why_without_table(robot: Robot, placement: Placement) -> str:
     return "have no table with yawed poses and were not released, the first: {}; `spirillum prepare` makes one"
 
 
-_NAMED = 3
-"""Robots that a sentence names; more are counted."""
+_NAMED = 3  # robots that a sentence names; more are counted
 
 
 def _of_robots(named_notes: Iterable[tuple[str, Note]]) -> list[Note]:

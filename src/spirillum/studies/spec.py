@@ -19,8 +19,7 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz, show_height
 
-_MOST_ROBOTS = 100_000
-"""Most robots that are loaded one by one."""
+_MOST_ROBOTS = 100_000  # most robots that are loaded one by one
 LARGEST_STORED = 500_000_000
 """Most results of a study (robots times models times friction models times rates), written into a store in pieces."""
 _Name = Annotated[Text, Field(min_length=1, max_length=200)]

@@ -36,10 +36,8 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, UNBOUNDED, WALLED, ModelChoice, choose_model
 from spirillum.units import show_apart
 
-LARGEST_STUDY = 5_000_000
-"""Most results (robots times models times friction models times rates) of one study."""
-_LARGEST_WITH_INTERVALS = 10_000
-"""Most robots of a study with a posterior, each of which swims a thousand times."""
+LARGEST_STUDY = 5_000_000  #: Most results (robots times models times friction models times rates) of one study.
+_LARGEST_WITH_INTERVALS = 10_000  # most robots of a study with a posterior, each of which swims a thousand times
 _WHAT = "a study file (TOML, see `spirillum schema study`)"
 
 
@@ -48,16 +46,12 @@ class LoadedStudy:
     """A checked study with its robots."""
 
     study: Study
-    robots: tuple[Robot, ...]
-    """One robot a channel of the grid, or the listed robots."""
-    question: Mapping[str, Any]
-    """All that decides the answer, for the fingerprint and the dataset's attributes."""
-    fit: Fit = NO_FIT
-    """Fitted values that act on the robots, or draws over which answers have intervals."""
+    robots: tuple[Robot, ...]  #: One robot a channel of the grid, or the listed robots.
+    question: Mapping[str, Any]  #: All that decides the answer, for the fingerprint and the dataset's attributes.
+    fit: Fit = NO_FIT  #: Fitted values that act on the robots, or draws over which answers have intervals.
     placements: tuple[Placement, ...] = ()
     """Pose of each of `robots` by a calibration; none where the study states it."""
-    model_reason: str = ""
-    """Why the model in place of `auto` was taken; empty where all models are named."""
+    model_reason: str = ""  #: Why the model in place of `auto` was taken; empty where all models are named.
 
     def placement_of(self, number: int) -> Placement:
         """Pose of one of `robots`."""
@@ -275,8 +269,7 @@ def _fit(study: Study, calibration: str | Path | None, posterior: str | Path | N
     return fit
 
 
-_VARIED = ("tail.wavelength", "tail.amplitude")
-"""Fields of a robot that a grid sets."""
+_VARIED = ("tail.wavelength", "tail.amplitude")  # fields of a robot that a grid sets
 
 
 def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None:

@@ -72,8 +72,7 @@ REASONS = (
 
 _ENDINGS = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
 """What the names of a quantity's arrays end with."""
-BLOCK = 25_000
-"""Robots of a task in closed form: a fifth of a second of work."""
+BLOCK = 25_000  #: Robots of a task in closed form: a fifth of a second of work.
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
 _PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one pose
 
@@ -82,8 +81,7 @@ Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]
 """Parts of a batch, their indices in it, and the model of each."""
 
-Part = dict[str, Values]
-"""Arrays of one task: (robots, friction models) or (robots, friction models, rates)."""
+Part = dict[str, Values]  #: Arrays of one task: (robots, friction models) or (robots, friction models, rates).
 
 
 @dataclass(frozen=True)
@@ -91,8 +89,7 @@ class StudyTask(ABC):
     """A block of robots of a study and how it is answered, as a value that other processes can take."""
 
     number: int
-    indices: Indices
-    """Indices of the robots in the flat order of the study."""
+    indices: Indices  #: Indices of the robots in the flat order of the study.
 
     @property
     def size(self) -> int:

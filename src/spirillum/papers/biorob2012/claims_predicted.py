@@ -126,8 +126,7 @@ def _verdict(holds: bool) -> Verdict:  # noqa: FBT001 - a truth value is what it
     return "agrees" if holds else "disagrees"
 
 
-_EQUAL = 0.05
-"""Relative difference within which motor rates count as identical, as for observations."""
+_EQUAL = 0.05  # relative difference within which motor rates count as identical, as for observations
 
 
 def predicted(evidence: Evidence) -> list[Claim]:

@@ -34,12 +34,10 @@ if TYPE_CHECKING:
 class LargestReynolds(NamedTuple):
     """The largest Reynolds number of a channel, and the tail that has it."""
 
-    value: float
-    """Re_max; the paper does not state its length scale."""
+    value: float  #: Re_max; the paper does not state its length scale.
     wavelength_mm: float
     amplitude_mm: float
-    figure: str
-    """The figure whose caption states it."""
+    figure: str  #: The figure whose caption states it.
 
 
 LARGEST_REYNOLDS = {
@@ -51,23 +49,17 @@ LARGEST_REYNOLDS = {
 GLOBAL_DROP = 0.389
 """Relative loss of the mean velocity of all tails from the wide to the narrow channel; text on Figs 5 and 6."""
 
-LOW_REYNOLDS = 0.1
-"""Upper bound of low Reynolds number conditions; text."""
+LOW_REYNOLDS = 0.1  #: Upper bound of low Reynolds number conditions; text.
 
-BODY_ROTATION_ERROR = 0.5
-"""Largest relative error of the predicted body rotation rates; text on Figs 5 and 6."""
+BODY_ROTATION_ERROR = 0.5  #: Largest relative error of the predicted body rotation rates; text on Figs 5 and 6.
 
-BODY_DRAG_FACTORS = {"wide": 1.95, "narrow": 3.6}
-"""Factors on the isolated body's drag along the axis; Table III."""
+BODY_DRAG_FACTORS = {"wide": 1.95, "narrow": 3.6}  #: Factors on the isolated body's drag along the axis; Table III.
 
-ROBOT_LENGTH = 0.1
-"""Lower bound of the prototype's length, m; text."""
+ROBOT_LENGTH = 0.1  #: Lower bound of the prototype's length, m; text.
 
-NARROWER = 0.25
-"""Relative reduction of the channel's radius from wide to narrow; text and Table I."""
+NARROWER = 0.25  #: Relative reduction of the channel's radius from wide to narrow; text and Table I.
 
-FRAME_RATE = 30.0
-"""Frame rate of the camera, Hz; text on the experiments."""
+FRAME_RATE = 30.0  #: Frame rate of the camera, Hz; text on the experiments.
 
 
 NO_RATES = "the observed rates are lost; give an observations file to decide"
@@ -163,10 +155,8 @@ def in_hertz(rate: float) -> str:
     return f"{rate / Hz:.3g} Hz"
 
 
-_CLOSE = 0.05
-"""Relative difference from a stated number within which it is met, as for observations."""
-_AS_MUCH = 0.8
-"""A factor is named beside the first if it moves a statement this much of what the first does."""
+_CLOSE = 0.05  # relative difference from a stated number within which it is met, as for observations
+_AS_MUCH = 0.8  # A factor is named beside the first if it moves a statement this much of what the first does
 _WORDS = {"friction_coefficient": "friction coefficient", "wait": "waiting time", "window": "time read over"}
 _TEXTS: dict[str, Callable[[float], str]] = {"gap": show_height, "wait": "{:g} s".format, "roughness": show_height}
 

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 
 _TITLE = "Loss of speed from the wide to the narrow channel"
 _MOST_COLUMNS = 5
-_STATED: Any = {"color": "black", "linestyle": (0, (4.0, 2.0)), "linewidth": 1.0}
-"""Style of the paper's values."""
+_STATED: Any = {"color": "black", "linestyle": (0, (4.0, 2.0)), "linewidth": 1.0}  # style of the paper's values
 
 
 def drop_picture(shown: StudyView) -> Picture | None:
@@ -123,8 +122,7 @@ def _entries(evidence: Evidence) -> list[Line2D]:
 _SIGHT = np.array([0.56, 0.76, -0.34])
 """Direction in which the picture is seen: from the side, from behind and from above."""
 _POINTS = 1200
-_MARKED = (0.215, 0.415, 0.63, 0.83)
-"""Positions of the frames, shares of the axial length."""
+_MARKED = (0.215, 0.415, 0.63, 0.83)  # positions of the frames, shares of the axial length
 _SHADES = ("#4a2410", "#c2763a", "#ffd9b0")
 
 

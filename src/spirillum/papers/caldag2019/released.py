@@ -17,8 +17,7 @@ from spirillum.dynamics.simulation import simulate
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 
-_SAMPLES = 24
-"""Samples a turn."""
+_SAMPLES = 24  # samples a turn
 
 
 def released_motion(robot: Robot, run: Mapping[str, Any], progress: Progress | None = None) -> dict[str, float]:
