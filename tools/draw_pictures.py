@@ -5,9 +5,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import av
+from frenet_figure import frenet_figure
 
 import spirillum as sp
-from spirillum.papers.biorob2012.figures import frenet_figure
 from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure

@@ -6,13 +6,14 @@ all directions have the same scale there, and no bound is ever hit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.data_tables import rows_of
 from spirillum.envelope import interval
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
@@ -76,109 +77,28 @@ class Uniform:
 Prior = LogNormal | Uniform  #: A prior as a map from a standard normal coordinate.
 
 
-@dataclass(frozen=True)
-class FitParameter:
+class FitParameter(NamedTuple):
     """Something that a fit may free."""
 
     name: str
+    unit: str
+    scope: str  #: One value for each `channel`, one for `all`, or (friction only) one for each `tail`.
+    models: tuple[str, ...]  #: Models that have it.
+    needs_motor: bool  #: Whether it acts on the motor's rate, so that the motor has to be predicted.
+    replaces: str  #: Field whose value the fit ignores; empty where its prior is around the robot's own value.
     meaning: str
     reason: str  #: Why its prior is as it is.
-    unit: str = ""
-    scope: Literal["channel", "all", "tail"] = "all"
-    """One value for each channel, one for all, or (friction only) one for each tail."""
-    models: tuple[str, ...] = tuple(SWIMMER_MODELS)  #: Models that have it.
-    needs_motor: bool = False  #: Whether it acts on the motor's rate, so that the motor has to be predicted.
 
 
-_AS_MOTORS_SCATTER = "around the robot's own value, 95 % within 20 %, as small motors scatter"
-_AS_PUBLISHED_SETS = "published sets of coefficients differ by a factor of two"
-_LISTED = (
-    FitParameter(
-        "body_drag",
-        "factor on the body's axial drag D_x, one for each channel (Table III)",
-        "a body in a tube drags as much as alone or several times more: from a third to fourteen times",
-        scope="channel",
-        models=CALIBRATED,
-    ),
-    FitParameter(
-        "body_rotation",
-        "factor on the body's rotational drag E_x, one for each channel (Table III)",
-        "walls raise it, and the paper found 0.6: from a seventh to seven times",
-        scope="channel",
-        models=CALIBRATED,
-    ),
-    FitParameter(
-        "friction",
-        "effective friction B_eff of eq. (18), one for each tail; from the observed motor rate",
-        "none of its own: it follows from (17) and (18), and its uncertainty from the rates and the other parameters",
-        unit="N m s/rad",
-        scope="tail",
-    ),
-    FitParameter(
-        "shared_friction",
-        "effective friction B_eff, one for all tails",
-        "around the value that takes half of the motor's torque at the observed rates, a factor of 19 either way",
-        unit="N m s/rad",
-        needs_motor=True,
-    ),
-    FitParameter(
-        "normal_factor", "factor on RFT's coefficient across the wire, c_n", _AS_PUBLISHED_SETS, models=("rft",)
-    ),
-    FitParameter(
-        "tangential_factor", "factor on RFT's coefficient along the wire, c_t", _AS_PUBLISHED_SETS, models=("rft",)
-    ),
-    FitParameter(
-        "wire_diameter",
-        "diameter of the tail's wire",
-        "around the robot's own value, 95 % within 20 %: lacquer, winding and measurement",
-        unit="m",
-        models=CALIBRATED,
-    ),
-    FitParameter(
-        "viscosity",
-        "viscosity of the fluid",
-        "around the robot's own value, 95 % within 20 %: silicone oil changes by 2 % a kelvin",
-        unit="Pa s",
-        needs_motor=True,
-    ),
-    FitParameter(
-        "torque_constant", "the motor's torque constant K_m", _AS_MOTORS_SCATTER, unit="N m/A", needs_motor=True
-    ),
-    FitParameter(
-        "back_emf_constant", "the motor's back-emf constant K_b", _AS_MOTORS_SCATTER, unit="V s/rad", needs_motor=True
-    ),
-    FitParameter(
-        "gap",
-        "gap under the body, one for each channel",
-        "anywhere in the band of `predict`, from a ninetieth to a ninth of the body's radius",
-        unit="m",
-        scope="channel",
-        models=("tube",),
-    ),
-    FitParameter(
-        "pitch",
-        "angle by which the nose is raised, one for each channel",
-        "anywhere from level to the steepest that every tail of the channel allows",
-        unit="rad",
-        scope="channel",
-        models=("tube",),
-    ),
-    FitParameter(
-        "roughness",
-        "height of the asperities on which the robot rests, which decides its gap, one for all channels",
-        "from polished surfaces to burrs and seams, 1e-4 to 1e-2 of the body's radius",
-        unit="m",
-        models=("tube",),
-    ),
-    FitParameter(
-        "friction_coefficient",
-        "coefficient of dry friction where the asperities carry the robot's weight",
-        "around 0.1, 95 % from 0.02 to 0.5: between asperities with a lubricant 0.05 to 0.15, dry more (Bowden and "
-        "Tabor, The Friction and Lubrication of Solids, 1950)",
-        models=("tube",),
-    ),
-)
-PARAMETERS: dict[str, FitParameter] = {parameter.name: parameter for parameter in _LISTED}  #: All parameters by name.
+def _parameters() -> Iterator[FitParameter]:
+    """The rows of `parameters.csv`."""
+    groups = {"all": tuple(SWIMMER_MODELS), "calibrated": CALIBRATED}
+    for row in rows_of("calibration/parameters.csv"):
+        name, unit, scope, models, motor, *words = row.values()
+        yield FitParameter(name, unit, scope, groups.get(models, (models,)), motor != "", *words)
+
+
+PARAMETERS = {parameter.name: parameter for parameter in _parameters()}  #: All parameters by name.
 
 UNWALLED = "sbt"
 """Model that is fitted where `auto` cannot take one with walls: the paper's, with factors on the body's drag."""
@@ -260,13 +180,6 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
 
 
 OBSERVED = ("tail.wavelength", "tail.amplitude")  #: Fields whose values are given by the observations.
-_IN_PLACE_OF = {
-    "body_drag": "calibration.{model}.body_drag",
-    "body_rotation": "calibration.{model}.body_rotation",
-    "friction": "friction.effective",
-    "shared_friction": "friction.effective",
-}
-"""Parameter to the field whose value a fit does not look at; priors of the others are around the robot's own values."""
 
 
 def check_not_set(
@@ -282,7 +195,7 @@ def check_not_set(
         )
     for known in _possible_models(model, free):
         for name in free_names(free, known, released=released and known == WALLED):
-            field = _IN_PLACE_OF.get(name, "").format(model=known)
+            field = PARAMETERS[name].replaces.format(model=known)
             if field in asked:
                 raise InputError(
                     f"{field} is set, and the fit of '{name}' ignores it; allowed: one of them (--free names "

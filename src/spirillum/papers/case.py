@@ -38,50 +38,34 @@ Provenance = Literal["text", "digitised", "deposit", "abstract", "second hand", 
 class CaseQuantity(Section):
     """A quantity of the publication and what it is here."""
 
-    label: str
-    """Name in words."""
+    label: str  #: Name in words.
     of: str
     """`swimming.NAME` of `predict`; `tail.drag`, `tail.thrust` or `tail.torque` of the bare tail; `run.NAME` of the
     robot released in its tube."""
-    unit: str = "1"
-    """Unit of the published values."""
-    si_unit: str = ""
-    """SI unit; empty: the same."""
-    si_value: float = 1.0
-    """SI value of one unit."""
-    over: float = 1.0
-    """Number by which the program's SI value is divided, such as 6 pi."""
-    viscosity: int = 0
-    """Power of the viscosity by which it is divided."""
-    radius: int = 0
-    """Power of the helix's radius by which it is divided."""
+    unit: str = "1"  #: Unit of the published values.
+    si_unit: str = ""  #: SI unit; empty: the same.
+    si_value: float = 1.0  #: SI value of one unit.
+    over: float = 1.0  #: Number by which the program's SI value is divided, such as 6 pi.
+    viscosity: int = 0  #: Power of the viscosity by which it is divided.
+    radius: int = 0  #: Power of the helix's radius by which it is divided.
 
 
 class CasePoint(Section):
     """One robot at one condition, with what was published of it."""
 
     label: str
-    x: float | None = None
-    """Abscissa in the figure."""
-    series: str = ""
-    """Curve to which it belongs."""
-    robot: str = ""
-    """Robot file of the case or preset; empty: the case's."""
-    model: str = ""
-    """Hydrodynamic model; empty: the case's."""
-    set: dict[str, Any] = Field(default_factory=dict)
-    """Fields of the robot; `unset` takes one out."""
+    x: float | None = None  #: Abscissa in the figure.
+    series: str = ""  #: Curve to which it belongs.
+    robot: str = ""  #: Robot file of the case or preset; empty: the case's.
+    model: str = ""  #: Hydrodynamic model; empty: the case's.
+    set: dict[str, Any] = Field(default_factory=dict)  #: Fields of the robot; `unset` takes one out.
     placement: dict[str, Any] = Field(default_factory=dict)
     run: dict[str, Any] = Field(default_factory=dict)
     """Settings of a run of the released robot, which needs its table; else none is made."""
-    assumed: bool = True
-    """Whether the case's assumptions are tried on it."""
-    over: str = ""
-    """Label of the point by whose values this one's are divided."""
-    minus: str = ""
-    """Label of the point whose values are subtracted."""
-    published: dict[str, float] = Field(default_factory=dict)
-    """Published values by quantity, in its unit."""
+    assumed: bool = True  #: Whether the case's assumptions are tried on it.
+    over: str = ""  #: Label of the point by whose values this one's are divided.
+    minus: str = ""  #: Label of the point whose values are subtracted.
+    published: dict[str, float] = Field(default_factory=dict)  #: Published values by quantity, in its unit.
     uncertainty: dict[str, float] = Field(default_factory=dict)
     """Stated uncertainty of a published value, in the same unit."""
 
@@ -90,18 +74,14 @@ class CaseAssumption(Section):
     """Something that the publication does not state, with a range: each value is tried alone."""
 
     name: str
-    values: list[str]
-    """The values tried, in words."""
-    set: dict[str, list[Any]] = Field(default_factory=dict)
-    """Fields of the robot and their value in each trial."""
+    values: list[str]  #: The values tried, in words.
+    set: dict[str, list[Any]] = Field(default_factory=dict)  #: Fields of the robot and their value in each trial.
     scale: dict[str, list[float]] = Field(default_factory=dict)
     """Fields of the robot and the factor on their nominal value in each trial."""
     placement: dict[str, list[Any]] = Field(default_factory=dict)
     """Fields of the placement and their value in each trial."""
-    run: dict[str, list[Any]] = Field(default_factory=dict)
-    """Settings of the run and their value in each trial."""
-    points: list[str] = Field(default_factory=list)
-    """Labels of the points that it concerns; empty: all."""
+    run: dict[str, list[Any]] = Field(default_factory=dict)  #: Settings of the run and their value in each trial.
+    points: list[str] = Field(default_factory=list)  #: Labels of the points that it concerns; empty: all.
 
 
 class CaseStatement(Section):
@@ -112,42 +92,31 @@ class CaseStatement(Section):
     quantity: str
     series: str = ""
     expect: Literal["rises", "falls", "above", "below", "has a maximum inside"]
-    than: float = 0.0
-    """Bound of `above` and `below`, in the quantity's unit."""
-    between: tuple[float, float] | None = None
-    """Abscissae between which it is judged."""
+    than: float = 0.0  #: Bound of `above` and `below`, in the quantity's unit.
+    between: tuple[float, float] | None = None  #: Abscissae between which it is judged.
 
 
 class Case(Section):
     """A validation case."""
 
     title: str
-    references: list[str]
-    """Keys of `citations.REFERENCES`."""
-    source: str
-    """Location of the numbers in the publication, and how they were read."""
+    references: list[str]  #: Keys of `citations.REFERENCES`.
+    source: str  #: Location of the numbers in the publication, and how they were read.
     read: Provenance
     kind: Literal["experiment", "computation", "statements"]
     cost: Literal["seconds", "minutes"] = "seconds"
     model: Literal["rft", "sbt", "slender", "tube"] = "slender"
-    robot: str = ""
-    """Robot of points that name none."""
-    settings: dict[str, Any] = Field(default_factory=dict)
-    """Fields of all robots."""
-    x: str = ""
-    """Label of the abscissa."""
-    curve: bool = False
-    """Whether the figure shows the values over the abscissa too."""
-    explanation: str
-    """Result of the comparison, and the reasons of its misses."""
-    recorded_within: float = 0.01
-    """Relative distance from the recorded value within which the program's has to be."""
+    robot: str = ""  #: Robot of points that name none.
+    settings: dict[str, Any] = Field(default_factory=dict)  #: Fields of all robots.
+    x: str = ""  #: Label of the abscissa.
+    curve: bool = False  #: Whether the figure shows the values over the abscissa too.
+    explanation: str  #: Result of the comparison, and the reasons of its misses.
+    recorded_within: float = 0.01  #: Relative distance from the recorded value within which the program's has to be.
     quantities: dict[str, CaseQuantity] = Field(default_factory=dict)
     points: list[CasePoint] = Field(default_factory=list)
     assumptions: list[CaseAssumption] = Field(default_factory=list)
     statements: list[CaseStatement] = Field(default_factory=list)
-    claims: str = ""
-    """Paper whose study gives more statements, see `papers.registry`."""
+    claims: str = ""  #: Paper whose study gives more statements, see `papers.registry`.
 
     def point(self, label: str) -> CasePoint:
         """Return the point of a label."""

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from frenet_figure import frenet_figure, frenet_frames
 from matplotlib.patches import FancyArrowPatch
 
 import spirillum as sp
-from spirillum.papers.biorob2012.figures import frenet_figure, frenet_frames
 
 XI = np.linspace(0.001, 0.059, 40)
 
