@@ -10,7 +10,7 @@ import spirillum as sp
 from spirillum.cli import main
 from spirillum.designs.criteria import Manufacturability, Variable, quantity_of, space_of
 from spirillum.designs.evaluation import Evaluation, Objective, Unknowns, unknowns_of
-from spirillum.designs.learned import Points, chosen_model, corrected, learned_best, points_of, solved_at
+from spirillum.designs.learned import Corrected, Points, chosen_model, learned_best, points_of, solved_at
 from spirillum.errors import InputError
 from spirillum.fluid.closed.rft import Rft
 from spirillum.robot.batch import RobotBatch
@@ -59,7 +59,7 @@ def test_learned_model_is_exact_where_it_was_solved_for_and_positive_definite_be
     space = space_of(robot, TAIL)
     shares = np.random.default_rng(3).random((9, 2))
     batch = space.batch(shares)
-    model = corrected("slender", truth(batch, space.variables))
+    model = Corrected("slender", truth(batch, space.variables))
     whole, true = joined(model.axial(batch)), joined(Rft().axial(batch))
     size = np.sqrt(np.abs(np.diagonal(true, axis1=-2, axis2=-1)))
     np.testing.assert_allclose(

@@ -158,10 +158,10 @@ def test_compressed_parts_of_a_study_are_not_inflated(tmp_path: Path) -> None:
     from spirillum.studies.work import tasks
 
     task = next(iter(tasks(load_study(study))))
-    assert kept(task, parts, 4) is None
+    assert kept(0, task, parts, 4) is None
     os.remove(parts / "part-00000.npz")  # noqa: PTH107
     os.mkfifo(parts / "part-00000.npz")
-    assert kept(task, parts, 4) is None
+    assert kept(0, task, parts, 4) is None
 
 
 @pytest.mark.parametrize("content", [b"[" * 100_000, b"", b"\xff", b"null", b'{"fingerprint": ' + b"1" * 5000 + b"}"])

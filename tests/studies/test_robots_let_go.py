@@ -89,7 +89,7 @@ def test_robots_that_were_not_let_go_come_last_the_faster_held_one_first() -> No
 
 def test_what_cannot_be_followed_is_no_number() -> None:
     robot = sp.load("biorob2012-wide")
-    task = SettledTask(0, np.array([0]), robot, Placement.of({"gap": "30 mm"}), Contact())
+    task = SettledTask(np.array([0]), robot, Placement.of({"gap": "30 mm"}), Contact())
     part = task.answer(None, None)
     assert set(part) == task.needed
     assert np.isnan(part["forward_velocity"]).all()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity
 from spirillum.calibration.identifiability import Identifiability
-from spirillum.calibration.least_squares import LeastSquares, PaperFit
+from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.likelihood import LEAST_RELATIVE
 from spirillum.calibration.methods import Method
 from spirillum.calibration.parameters import Estimate
@@ -24,6 +23,7 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, interval, quantity
 from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
 from spirillum.notes import Note, note_attributes
+from spirillum.robot.robot import Robot
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -58,7 +58,6 @@ class Calibrated(DisplayMixin):
     discrepancy: dict[Quantity, Estimate]
     """Relative misfit of the model from robot to robot, beyond the scatter of the trials."""
     error: dict[Quantity, float]  #: Relative error of one trial.
-    paper: PaperFit | None
     least_squares: LeastSquares | None
     posterior: Posterior | None
     identifiability: Identifiability | None
@@ -142,12 +141,8 @@ def _content(found: Calibrated) -> dict[str, Any]:
 
 def _tail(found: Calibrated, place: int) -> dict[str, Any]:
     robot = found.experiment.robots[place]
-    content: dict[str, Any] = {
-        "channel_diameter": quantity(robot.channel.diameter if robot.channel else None, "m"),
-        "wavelength": quantity(robot.tail.wavelength, "m"),
-        "amplitude": quantity(robot.tail.amplitude, "m"),
-        "rows": list(found.experiment.rows[place]),
-    }
+    content: dict[str, Any] = {name: quantity(size, "m") for name, size in _geometry(robot).items()}
+    content["rows"] = list(found.experiment.rows[place])
     if found.friction:
         item = found.friction[place]
         content["effective_friction"] = quantity(item.value, "N m s/rad", **item.interval)
@@ -165,8 +160,16 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
     return content
 
 
+def _geometry(robot: Robot) -> dict[str, float | None]:
+    """Channel and tail of a robot, m."""
+    channel = robot.channel.diameter if robot.channel else None
+    return {"channel_diameter": channel, "wavelength": robot.tail.wavelength, "amplitude": robot.tail.amplitude}
+
+
 def posterior_tree(found: Calibrated) -> xr.DataTree:
     """Groups `posterior`, `log_likelihood` (robot by robot), `observed_data` and `sample_stats` of a posterior."""
+    from arviz_base import from_dict
+
     posterior = found.posterior
     assert posterior is not None  # noqa: S101 - checked by the caller
     density, problem, experiment = posterior.density, found.problem, found.experiment
@@ -174,9 +177,19 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
     units = {item.label: item.parameter.unit or "1" for item in problem.coordinates}
     logs = np.concatenate([density.by_robot(block) for block in np.array_split(posterior.flat, 64)])
     observed = {name: problem.ratio(name).mean for name in problem.quantities}
+    chains, draws, _ = posterior.z.shape
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # many walkers with few draws each are meant
-        tree = _tree(posterior, logs, observed, experiment.labels())
+        tree: xr.DataTree = from_dict(
+            {
+                "posterior": values,
+                "log_likelihood": {"robot": logs.reshape(chains, draws, experiment.size)},
+                "sample_stats": {"lp": density(posterior.flat).reshape(chains, draws)},
+                "observed_data": observed,
+            },
+            dims={"robot": ["tail"], **{str(name): ["tail"] for name in observed}},
+            coords={"tail": np.array(experiment.labels(), dtype=str)},
+        )
     for name in values:
         tree["posterior"][name].attrs = {"units": units.get(name, "1"), "long_name": name.replace("_", " ")}
     tree.attrs = {
@@ -206,23 +219,6 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
     return tree
 
 
-def _tree(posterior: Posterior, logs: Samples, observed: Mapping[Quantity, Samples], tails: list[str]) -> xr.DataTree:
-    from arviz_base import from_dict
-
-    chains, draws, _ = posterior.z.shape
-    tree: xr.DataTree = from_dict(
-        {
-            "posterior": posterior.values(),
-            "log_likelihood": {"robot": logs.reshape(chains, draws, len(tails))},
-            "sample_stats": {"lp": posterior.density(posterior.flat).reshape(chains, draws)},
-            "observed_data": dict(observed),
-        },
-        dims={"robot": ["tail"], **{str(name): ["tail"] for name in observed}},
-        coords={"tail": np.array(tails, dtype=str)},
-    )
-    return tree
-
-
 def _tails(found: Calibrated) -> list[dict[str, Any]]:
     """Observations of every robot with their errors."""
     problem, experiment = found.problem, found.experiment
@@ -239,9 +235,7 @@ def _tails(found: Calibrated) -> list[dict[str, Any]]:
         }
         tails.append(
             {
-                "channel_diameter": robot.channel.diameter if robot.channel else None,
-                "wavelength": robot.tail.wavelength,
-                "amplitude": robot.tail.amplitude,
+                **_geometry(robot),
                 "tail_rate": float(experiment.tail_rate[place]) if np.isfinite(experiment.tail_rate[place]) else None,
                 "seen": seen,
                 "by_motor": bool(experiment.by_motor[place]),
@@ -254,14 +248,7 @@ def _tails(found: Calibrated) -> list[dict[str, Any]]:
 
 def _friction(found: Calibrated) -> list[dict[str, Any]]:
     return [
-        {
-            "channel_diameter": robot.channel.diameter if robot.channel else None,
-            "wavelength": robot.tail.wavelength,
-            "amplitude": robot.tail.amplitude,
-            "value": item.value,
-            "low": item.low,
-            "high": item.high,
-        }
+        {**_geometry(robot), "value": item.value, "low": item.low, "high": item.high}
         for robot, item in zip(found.experiment.robots, found.friction_given, strict=False)
         if np.isfinite(item.value)
     ]

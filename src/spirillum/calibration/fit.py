@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -130,41 +131,32 @@ def fit_model(
     experiment = read_experiment(observations, given_robots(robots))
     choice = choose_fitted_model(model, experiment, free, method)
     names = free_names(free, choice.model, released=answer == RELEASED)
-    if free is None and not _has_motor(experiment):
+    robot = experiment.robots[0]
+    driven = robot.drive is not None and robot.drive.kind == "dc-motor" and robot.drive.joint == "revolute"
+    if free is None and not (driven and robot.motor is not None and np.any(experiment.motor_rate.seen)):
         names = tuple(name for name in names if name not in ("friction", "shared_friction"))
     if method == "posterior":  # before tables and trials are computed
         for library in ("emcee", "arviz_base", "arviz_stats"):
             import_optional(library, "method 'posterior'", "posterior")
     problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare, answer=answer)
     inertia_warnings(experiment)
-    found = _fitted_by(method, problem, friction, sampling, progress)
+    if method == "paper":
+        found = _by_paper(problem, friction)
+    else:
+        fit = least_squares_fit(problem)
+        check_identifiable(problem, fit.z)
+        check_plausible(problem, fit.z)
+        report = identified(problem, fit)
+        posterior = None if method == "least-squares" else sampled(problem, fit, sampling, progress)
+        found = _by_draws(problem, fit, report, reading=friction, posterior=posterior)
     return replace(found, model_reason=choice.reason)
 
 
-def _fitted_by(
-    method: str, problem: Problem, friction: str, sampling: Sampling | None, progress: Progress | None
-) -> Calibrated:
-    if method == "paper":
-        return _by_paper(problem, friction)
-    fit = least_squares_fit(problem)
-    check_identifiable(problem, fit.z)
-    check_plausible(problem, fit.z)
-    report = identified(problem, fit)
-    posterior = None if method == "least-squares" else sampled(problem, fit, sampling, progress)
-    return _by_draws(problem, fit, report, reading=friction, posterior=posterior)
-
-
-def _has_motor(experiment: Experiment) -> bool:
-    robot = experiment.robots[0]
-    driven = robot.drive is not None and robot.drive.kind == "dc-motor" and robot.drive.joint == "revolute"
-    return driven and robot.motor is not None and bool(np.any(experiment.motor_rate.seen))
-
-
 def _by_paper(problem: Problem, reading: str) -> Calibrated:
-    fit = paper_fit(problem)
-    z = problem.coordinate_of({name: np.array(value) for name, value in fit.values.items()})
+    factors = paper_fit(problem)
+    values = {name: Estimate(value, nan, nan) for name, value in factors.items()}
+    z = problem.coordinate_of({name: np.array(value) for name, value in factors.items()})
     check_plausible(problem, z)
-    nan = float("nan")
     friction: tuple[Estimate, ...] = ()
     if "friction" in problem.free:
         best = problem.friction(z[None], problem.experiment.motor_rate.mean[None], reading)[0]
@@ -175,14 +167,13 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         problem=problem,
         method="paper",
         reading=reading,
-        values={name: Estimate(value, nan, nan) for name, value in fit.values.items()},
+        values=values,
         friction=friction,
         friction_sensitivity=sensitivity,
         friction_statement=friction_statement(problem, friction, sensitivity),
         predicted={name: (values, unknown, unknown) for name, values in problem.predicted_at(z).items()},
         discrepancy={},
         error={name: problem.ratio(name).pooled_error for name in problem.quantities},
-        paper=fit,
         least_squares=None,
         posterior=None,
         identifiability=None,
@@ -192,7 +183,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
             *prior_warnings(problem, z),
             *factor_misfit_warnings(problem, z),
             *friction_warnings(problem, z, reading),
-            *narrow_channel_warnings(problem, {name: Estimate(v, nan, nan) for name, v in fit.values.items()}),
+            *narrow_channel_warnings(problem, values),
             *common_warnings(problem, friction),
         ),
     )
@@ -236,7 +227,6 @@ def _by_draws(
         predicted=_predicted(problem, middle, z, tau, rng),
         discrepancy=discrepancy,
         error=of_a_trial,
-        paper=None,
         least_squares=fit,
         posterior=posterior,
         identifiability=report,
@@ -288,7 +278,6 @@ def _friction(
         within = _estimates(middle, problem.friction(z, rates, reading, scaled))
     off = torque_error(problem)
     if off is None:
-        nan = float("nan")
         return given, within, tuple(Estimate(item.value, nan, nan) for item in given)
     # In Stokes flow a torque that is off by a factor is that of a fluid whose viscosity is.
     torque = np.exp(stated_spread(off) * own.normal(size=(z.shape[0], 1)))

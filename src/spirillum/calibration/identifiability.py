@@ -132,7 +132,7 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
         return Note("not-identifiable", words, labels)
     moved = z + 0.5 * direction * np.sign(direction[named[0]])
     before, after = problem.values_at(z), problem.values_at(moved)
-    changes = [f"{label} by {_change(before[label], after[label])}" for label in labels]
+    changes = [f"{label} by {100 * (after[label] / before[label] - 1.0):+.2g} %" for label in labels]
     effect = f"{0.5 * singular:.1g}" if singular > 2e-3 else "less than 0.001"
     words = (
         f"{_listed(changes)} trade off: together they move predictions by {effect} standard errors, and the "
@@ -143,10 +143,6 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
 
 def _listed(items: Sequence[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
-
-
-def _change(before: float, after: float) -> str:
-    return f"{100 * (after / before - 1.0):+.2g} %"
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,6 @@ class LeastSquares:
     trials' errors are neither seen nor stated."""
     freedom: int  #: Observed means less free numbers.
     left: dict[Quantity, float]  #: Degrees of freedom that the fit leaves each quantity.
-    residuals: dict[Quantity, Samples]  #: Observed over predicted less one, robot by robot.
 
 
 def sensitivities(problem: Problem, z: Samples) -> dict[Quantity, Samples]:
@@ -117,16 +116,15 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
             break
         z = _best(problem, z, error, discrepancy, starts=1, prior=1.0)
         left = _left(problem, z, error, discrepancy)
-    predicted = problem.predicted_at(z)
+    jacobian = np.concatenate(list(weighted_sensitivities(problem, z, error, discrepancy).values()))
     return LeastSquares(
         z=z,
-        covariance=_covariance(problem, z, error, discrepancy),
+        covariance=np.linalg.inv(jacobian.T @ jacobian + np.eye(z.size)),  # with the prior's information
         discrepancy=discrepancy,
         error=error,
         chi2=chi2,
         freedom=_count(problem) - z.size,
         left=left,
-        residuals={name: problem.ratio(name).mean / predicted[name] - 1.0 for name in predicted},
     )
 
 
@@ -331,30 +329,11 @@ def _drawn_discrepancy(total: float, expected: float, left: float, count: int, r
     return found
 
 
-def _covariance(
-    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
-) -> Samples:
-    """Inverse of the information of means and prior."""
-    jacobian = np.concatenate(list(weighted_sensitivities(problem, z, error, discrepancy).values()))
-    found: Samples = np.linalg.inv(jacobian.T @ jacobian + np.eye(z.size))
-    return found
-
-
 _FACTORS = ("body_drag", "body_rotation")
 
 
-@dataclass(frozen=True)
-class PaperFit:
-    """Factors by label, and how they differ from tail to tail."""
-
-    values: dict[str, float]  #: Factor of each channel.
-    by_robot: dict[str, Samples]
-    """The factor that each robot alone would give, by parameter; NaN where it was not observed."""
-    spread: dict[str, float]  #: Standard deviation of these within a channel, by label; NaN for a single robot.
-
-
-def paper_fit(problem: Problem) -> PaperFit:
-    """Invert (15) for the drag factors."""
+def paper_fit(problem: Problem) -> dict[str, float]:
+    """Invert (15) for the drag factors, by their labels."""
     names = [name for name in problem.free if name != "friction"]
     wrong = [name for name in names if name not in _FACTORS]
     if wrong or problem.model.placed:
@@ -370,7 +349,6 @@ def paper_fit(problem: Problem) -> PaperFit:
         )
     by_robot, weights = _inverted(problem)
     values: dict[str, float] = {}
-    spread: dict[str, float] = {}
     for item in problem.coordinates:
         name, inside = item.parameter.name, problem.experiment.channel == item.channel
         known = inside & np.isfinite(by_robot[name])
@@ -381,13 +359,12 @@ def paper_fit(problem: Problem) -> PaperFit:
             )
         own, weight = by_robot[name][known], weights[name][known]
         values[item.label] = float(np.sum(weight * own) / np.sum(weight))
-        spread[item.label] = float(own.std(ddof=1)) if own.size > 1 else float("nan")
         if values[item.label] <= 0:
             raise InputError(
                 f"{problem.experiment.source}: {item.label} comes out as {values[item.label]:.3g}; allowed: "
                 f"observations that model '{problem.model.name}' can explain with a positive factor"
             )
-    return PaperFit(values, by_robot, spread)
+    return values
 
 
 def _inverted(problem: Problem) -> tuple[dict[str, Samples], dict[str, Samples]]:

@@ -32,7 +32,7 @@ _NOTHING = -1e30  # log density where there is none: finite, for the sampler tak
 _LARGEST = 8.0  # coordinates beyond this many standard deviations of the prior have no density
 
 
-def half_normal(z: Samples, scale: float) -> Samples:
+def half_normal(z: Samples, scale: float = 1.0) -> Samples:
     """A half-normal number at a standard normal coordinate."""
     from scipy.special import ndtr, ndtri
 
@@ -64,7 +64,7 @@ class Density:
         first = len(self.problem.coordinates)
         names = self.problem.quantities
         count = len(names)
-        both = half_normal(z[:, first:], 1.0)
+        both = half_normal(z[:, first:])
         tau = {name: DISCREPANCY_SCALE * both[:, n] for n, name in enumerate(names)}
         sigma = {name: ERROR_SCALE * both[:, count + n] for n, name in enumerate(names)}
         return tau, sigma

@@ -219,22 +219,18 @@ def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, 
                 f"assume-uncertainty = '{str(field)[:40]}'{did_you_mean(str(field), ASSUMABLE)}; allowed: "
                 f"{', '.join(ASSUMABLE)}"
             )
-        found[ASSUMABLE[field]] = _share(field, share)
+        text = str(share).strip()
+        try:
+            value = float(text.removesuffix("%")) * (0.01 if text.endswith("%") else 1.0)
+        except ValueError:
+            value = float("nan")
+        if isinstance(share, bool) or not 0.0 < value <= _LARGEST_UNCERTAINTY:
+            raise InputError(
+                f"assume-uncertainty {field} = '{text[:40]}'; allowed: half of its relative 95 % interval, such as "
+                f"5%, up to {100 * _LARGEST_UNCERTAINTY:g}%"
+            )
+        found[ASSUMABLE[field]] = value
     return found
-
-
-def _share(field: str, share: str | float) -> float:
-    text = str(share).strip()
-    try:
-        value = float(text.removesuffix("%")) * (0.01 if text.endswith("%") else 1.0)
-    except ValueError:
-        value = float("nan")
-    if isinstance(share, bool) or not 0.0 < value <= _LARGEST_UNCERTAINTY:
-        raise InputError(
-            f"assume-uncertainty {field} = '{text[:40]}'; allowed: half of its relative 95 % interval, such as 5%, up "
-            f"to {100 * _LARGEST_UNCERTAINTY:g}%"
-        )
-    return value
 
 
 LEVEL = 0.95  #: Level of all intervals.

@@ -151,13 +151,14 @@ def suggest(
     found: list[tuple[CandidateRobot, Samples]] = []
     left_out = []
     numbers, names = _numbers(known)
+    model = find_swimmer_model(known.model)
     for place, robot in enumerate(listed):
         on_progress("candidates", place, len(listed))
         outside = _outside(known, robot, answer)
         if outside:
             left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {outside}"))
             continue
-        seen = _kinematics(known, robot) if answer == HELD else _trial_kinematics(known, robot)
+        seen = drawn_kinematics(robot, model, known) if answer == HELD else _trial_kinematics(known, robot)
         if isinstance(seen, str):
             left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {seen}"))
             continue
@@ -199,11 +200,6 @@ def _papers_robots(known: PosteriorFile) -> list[Robot]:
             "paper's; allowed: ROBOT, one for each channel that might be used"
         )
     return robots
-
-
-def _kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Samples]:
-    """Advance and turning of a held robot at every draw."""
-    return drawn_kinematics(robot, find_swimmer_model(known.model), known)
 
 
 def _trial_kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Samples] | str:

@@ -175,7 +175,7 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
         limits = reynolds_limits(searched.samples.batch, motion.reynolds_number, motion.tail_reynolds_number)
         inertia = stokes_flow_problem(searched.samples.batch, limits)
         why = inertia.replace("; ", ", ") or (f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion")
-    words = ", ".join(f"{path} = {with_unit(value, _unit(searched.space, path))}" for path, value in values.items())
+    words = ", ".join(f"{item.path} = {with_unit(values[item.path], item.unit)}" for item in searched.space.variables)
     return (
         f"no design keeps all conditions ({archive.count} tried, {archive.refused} cannot be built or have no steady "
         f"motion, {archive.breaking} break a condition); the nearest, {words}: {why}; allowed: wider ranges or looser "
@@ -186,10 +186,6 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
 def _named(space: Space, shares: Samples) -> dict[str, float]:
     values = space.values(shares[None])[0]
     return {variable.path: float(value) for variable, value in zip(space.variables, values, strict=True)}
-
-
-def _unit(space: Space, path: str) -> str:
-    return next(variable.unit for variable in space.variables if variable.path == path)
 
 
 def _answer(
@@ -217,7 +213,7 @@ def _answer(
             stated.samples.number,
             low,
             high,
-            _met(objective, own[0], stated.samples.sets),
+            None if objective.target is None else _share(objective.target.excess(own[0]) <= 0, stated.samples.sets),
             _deciding(stated.samples.values, own[0]),
         )
     alternatives = [_alternative("today", None, stated, own[0], unknowns)]
@@ -248,13 +244,6 @@ def _answer(
         warnings=_warnings(given, unknowns, stated, best, motion, bound_by),
         leading=tuple(leading),
     )
-
-
-def _met(objective: Objective, values: Samples, sets: int) -> tuple[float, float, float] | None:
-    """Probability that the target is met, with its interval."""
-    if objective.target is None:
-        return None
-    return _share(objective.target.excess(values) <= 0, sets)
 
 
 def _share(flags: Flags, sets: int) -> tuple[float, float, float]:

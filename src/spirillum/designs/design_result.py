@@ -231,8 +231,7 @@ def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectivePro
     shares[:, number] = along
     found = searched.scores(shares).values[0]
     own = int(np.argmin(np.abs(values - variable.at(best[None, number])[0])))
-    sign = 1.0 if objective.target is not None else objective.sign
-    near = np.where(np.isfinite(found), sign * (found[own] - found), np.inf) <= _FLAT * abs(found[own])
+    near = np.where(np.isfinite(found), objective.direction * (found[own] - found), np.inf) <= _FLAT * abs(found[own])
     first, last = own, own
     while first > 0 and near[first - 1]:
         first -= 1
@@ -249,7 +248,6 @@ def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectivePro
 def _edge(searched: Evaluation, best: Samples, number: int, along: Samples, side: tuple[int, int]) -> float:
     """Value beyond which the objective is lost or a condition broken, between two points of a profile, by bisection."""
     variable, objective = searched.space.variables[number], searched.objectives[0]
-    sign = 1.0 if objective.target is not None else objective.sign
     most = float(searched.scores(best[None]).values[0, 0])
     inside, beyond = float(along[side[0]]), side[0] + side[1]
     if not 0 <= beyond < len(along):
@@ -259,7 +257,7 @@ def _edge(searched: Evaluation, best: Samples, number: int, along: Samples, side
         middle = best.copy()
         middle[number] = 0.5 * (inside + outside)
         value = float(searched.scores(middle[None]).values[0, 0])
-        if sign * (most - value) <= _FLAT * abs(most):
+        if objective.direction * (most - value) <= _FLAT * abs(most):
             inside = middle[number]
         else:
             outside = middle[number]

@@ -133,6 +133,11 @@ class Objective:
         return cost
 
     @property
+    def direction(self) -> float:
+        """+1 where a larger value is better, -1 where a smaller one is."""
+        return self.sign if self.target is None else 1.0
+
+    @property
     def name(self) -> str:
         """Name of its values in tables: the quantity's, or `probability`."""
         return self.quantity.name if self.target is None else "probability"

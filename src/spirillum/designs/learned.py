@@ -10,7 +10,6 @@ not change C: what is not known of them costs no solve.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
@@ -92,7 +91,7 @@ def features_of(batch: RobotBatch, variables: tuple[Variable, ...]) -> Samples:
 
 
 class Corrected(SwimmerModel):
-    """A model that solves for the flow, as it is learned: axial entries only."""
+    """`tube`, at the reference pose, or `slender` as it is learned: axial entries only."""
 
     title = "learned"
     references = ("lighthill1976", "perrin1934")
@@ -100,20 +99,18 @@ class Corrected(SwimmerModel):
     parts = ()
     axial_only = True
 
-    def __init__(self, points: Points) -> None:
+    def __init__(self, name: str, points: Points) -> None:
         """Answer between some points."""
-        self.points = points
+        self.name, self.points = name, points
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Limits of the model and of the fast model; evaluated once for each tail."""
         features = features_of(batch, self.points.variables)
         _, first, inverse = np.unique(features, axis=0, return_index=True, return_inverse=True)
         few, index = batch.taken(first), np.ravel(inverse)
-        return [_spread(item, index, batch.size) for item in (*self._own_domain(few), *Sbt().domain(few))]
-
-    @abstractmethod
-    def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        """Limits of the model that need no solution of the flow."""
+        walled = self.name == WALLED
+        own = pose_limits(few, "robot", Slender().part_domain(few, "robot")) if walled else Slender().domain(few)
+        return [_spread(item, index, batch.size) for item in (*own, *Sbt().domain(few))]
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`."""
@@ -134,29 +131,6 @@ class Corrected(SwimmerModel):
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:  # noqa: ARG002 - of no part
         """Not known: NaN."""
         return np.full((batch.size, 6, 6), np.nan)
-
-
-class LearnedTube(Corrected):
-    """Surrogate of `tube`, at the reference pose."""
-
-    name = "tube"
-
-    def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        return pose_limits(batch, "robot", Slender().part_domain(batch, "robot"))
-
-
-class LearnedSlender(Corrected):
-    """`slender` as it is learned."""
-
-    name = "slender"
-
-    def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        return Slender().domain(batch)
-
-
-def corrected(name: str, points: Points) -> Corrected:
-    """A model as it is learned from some points."""
-    return {"tube": LearnedTube, "slender": LearnedSlender}[name](points)
 
 
 def _spread(limit: Limit, index: np.ndarray[Any, Any], size: int) -> Limit:
@@ -193,8 +167,13 @@ def _exponential(upper: Samples) -> Samples:
     full = np.zeros((len(upper), 3, 3))
     full[:, _UPPER[0], _UPPER[1]] = upper
     full[:, _UPPER[1], _UPPER[0]] = upper
-    values, vectors = np.linalg.eigh(full)
-    found: Samples = (vectors * np.exp(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
+    return _of_eigenvalues(full, np.exp)
+
+
+def _of_eigenvalues(matrices: Samples, function: Callable[[Samples], Samples]) -> Samples:
+    """A function of symmetric matrices, (n, 3, 3)."""
+    values, vectors = np.linalg.eigh(matrices)
+    found: Samples = (vectors * function(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
     return found
 
 
@@ -211,8 +190,7 @@ def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callabl
     if not (np.all(np.isfinite(found)) and np.all(sound)):
         raise InputError("the flow around a design is not resolved; allowed: narrower ranges")
     lower = np.linalg.inv(np.linalg.cholesky(fast))
-    values, vectors = np.linalg.eigh(lower @ found @ np.swapaxes(lower, -1, -2))
-    logarithm = (vectors * np.log(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
+    logarithm = _of_eigenvalues(lower @ found @ np.swapaxes(lower, -1, -2), np.log)
     return Points(variables, features_of(batch, variables), logarithm[:, _UPPER[0], _UPPER[1]])
 
 
@@ -284,19 +262,19 @@ def learned_best(
     """Designs with the learned model, all that the last search has evaluated, the best, and how well it is known."""
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
-    empty = replace(blank, model=corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))
+    empty = replace(blank, model=Corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))
     first = _first_designs(empty, own, seed)
     points = _solved(empty, first, own, solving, on_progress, None)
     last = 1.0
     for number in range(_ROUNDS):
-        evaluation, archive = replace(blank, model=corrected(name, points)), Archive()
+        evaluation, archive = replace(blank, model=Corrected(name, points)), Archive()
         best = best_design(evaluation, archive, seed=seed, on_progress=on_progress)
         if not best.possible or last <= _AGREES:
             break
         before = _objective(evaluation, best.shares)
         more = [best.shares, *_runner_up(evaluation, archive, best.shares, number)]
         points = _solved(empty, np.stack(more), own, solving, on_progress, points)
-        after = _objective(replace(blank, model=corrected(name, points)), best.shares)
+        after = _objective(replace(blank, model=Corrected(name, points)), best.shares)
         last = abs(before / after - 1.0) if after else abs(before - after)
     return evaluation, archive, best, Learned(len(points.features), last, _left_out(evaluation, name, points))
 
@@ -357,7 +335,7 @@ def _runner_up(evaluation: Evaluation, archive: Archive, best: Samples, number: 
     """Another good design, farther from the best one in earlier rounds: it may be better than it is thought to be."""
     shares, values = archive.all()
     objective = evaluation.objectives[0]
-    worth = values[0] * (1.0 if objective.target is not None else objective.sign)
+    worth = values[0] * objective.direction
     apart = np.max(np.abs(shares - best), axis=1) >= 0.2 / (1 + number)
     worth = np.where(apart & np.isfinite(worth), worth, -np.inf)
     first = int(np.argmax(worth))
@@ -376,7 +354,7 @@ def _left_out(evaluation: Evaluation, name: str, points: Points) -> float:
             continue
         shares = space.settled(shares[None])[0]
         true = _objective(evaluation, shares)
-        guess = _objective(replace(evaluation, model=corrected(name, points.without(number))), shares)
+        guess = _objective(replace(evaluation, model=Corrected(name, points.without(number))), shares)
         if np.isfinite(true) and np.isfinite(guess) and true:
             errors.append((evaluation.objectives[0].sign * true, guess / true - 1.0))
     better = [error for _, error in sorted(errors, reverse=True)[: (len(errors) + 1) // 2]]

@@ -128,28 +128,9 @@ class PosteriorFile:
 
     def central(self, robot: Robot) -> Robot:
         """The robot with the posterior median in place of its own values."""
-        factors = [name for name in ("body_drag", "body_rotation") if name in self.draws]
-        entries = []
-        for place, diameter in enumerate(self.channels if factors else ()):
-            middle = {name: float(self._column(name, place, self.middle)) for name in factors}
-            own = robot.calibration.get(self.model)
-            kept = {name: getattr(own, name) for name in ("body_drag", "body_rotation")} if own else {}
-            fitted_to = FittedTo.model_construct(
-                channel_diameter=diameter, body_diameter=self.body[0], body_length=self.body[1]
-            )
-            entries.append(Calibration.model_construct(**(kept | middle), source=self.source, fitted_to=fitted_to))
-        names = {"shared_friction": "friction"}
-        values: dict[str, Any] = {
-            names.get(name, name): float(self._column(name, 0, self.middle))
-            for name in self.draws
-            if names.get(name, name) in FittedValues.model_fields
-        }
-        file = CalibrationFile.model_construct(
-            calibration={self.model: tuple(entries)} if entries else {},
-            fitted=FittedValues.model_construct(**values),
-            friction=self.frictions,
-        )
-        return calibrated_robot(robot, file)
+        channel = nearest_channel(robot, self.channels)
+        middle = {name: float(self._column(name, channel, self.middle)) for name in self.draws}
+        return self._at(middle, robot, self.frictions)
 
     def drawn(self, robot: Robot, count: int, rng: np.random.Generator) -> list[Robot]:
         """The robot with the values of some draws in place of its own, evenly spaced among them."""
@@ -169,8 +150,8 @@ class PosteriorFile:
         found: list[int] = np.linspace(0, self.count - 1, min(count, self.count)).round().astype(int).tolist()
         return found
 
-    def _at(self, values: Mapping[str, float], robot: Robot) -> Robot:
-        """The robot with some fitted numbers in place of its own."""
+    def _at(self, values: Mapping[str, float], robot: Robot, tails: tuple[FittedFriction, ...] = ()) -> Robot:
+        """The robot with some fitted numbers, and B_eff of `tails`, in place of its own."""
         own = robot.calibration.get(self.model)
         factors: dict[str, Any] = {
             name: values.get(name, getattr(own, name, 1.0)) for name in ("body_drag", "body_rotation")
@@ -189,6 +170,7 @@ class PosteriorFile:
         file = CalibrationFile.model_construct(
             calibration={self.model: (entry,)} if factors.keys() & values.keys() else {},
             fitted=FittedValues.model_construct(**(fields | {"friction": friction})),
+            friction=tails,
         )
         return calibrated_robot(robot, file)
 

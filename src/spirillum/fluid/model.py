@@ -26,7 +26,7 @@ PARTS = ("body", "coupling", "tail", "rotor", "robot")
 class ResistanceModel(ABC):
     """A model that knows the resistance of some parts of a robot."""
 
-    name: ClassVar[str]
+    name: str
     """Name on the command line."""
     title: ClassVar[str]
     references: ClassVar[tuple[str, ...]]

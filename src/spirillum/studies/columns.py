@@ -27,7 +27,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, gathered, groups
+from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, flag_attributes, gathered, groups
 from spirillum.swimming.band import at_pose, band_poses, joined
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.released_motion import ASSUMPTION
@@ -70,30 +70,23 @@ class BandTask(OneModel):
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute steady swimming at this pose, (robots, friction models); NaN where there is none."""
         model = find_swimmer_model(self.model)
-        there = [_quickly(robot, model) for robot in self.robots]
+        quick = [(robot, quickest(model, robot)) for robot in self.robots]
+        # From its table, or solved with the resolution of a band.
+        there = [(at_pose(one, one.placement), model) if form is model else (one, form) for one, form in quick]
         found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
         return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_POSES}
 
 
-def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
-    """The tasks of the band, always in the same order, numbered from `first`; none where it is not requested."""
+def band_tasks(loaded: LoadedStudy) -> Iterator[BandTask]:
+    """The tasks of the band, always in the same order; none where it is not requested."""
     if not loaded.study.band:
         return
-    number = first
     for indices, batch in groups(loaded):
         robots = [block for _, block in batch.blocks(1)]
         for name in loaded.study.models:
             model = find_swimmer_model(name)
             for pose, sharing in _shared_poses(robots, model):
-                there = tuple(sharing.values())
-                yield BandTask(number, indices[list(sharing)], name, pose, there)
-                number += 1
-
-
-def _quickly(robot: RobotBatch, model: SwimmerModel) -> tuple[RobotBatch, SwimmerModel]:
-    """A robot with the form of a model that answers first: from its table, or solved with the resolution of a band."""
-    quick = quickest(model, robot)
-    return (at_pose(robot, robot.placement), model) if quick is model else (robot, quick)
+                yield BandTask(indices[list(sharing)], name, pose, tuple(sharing.values()))
 
 
 def _shared_poses(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
@@ -236,25 +229,22 @@ class TrialTask(OneRobot):
         return part
 
 
-def held_tasks(loaded: LoadedStudy, first: int) -> Iterator[HeldTask]:
-    """One task for each robot with a table, numbered from `first`, where no model of the study computes walls."""
+def held_tasks(loaded: LoadedStudy) -> Iterator[HeldTask]:
+    """One task for each robot with a table, where no model of the study computes walls."""
     if any(find_swimmer_model(name).placed for name in loaded.study.models) or loaded.count > _MOST_HELD:
         return
     for index in range(loaded.count):
         robot = loaded.robot_at(index)
         if robot.channel is not None and has_table(RobotBatch.of(robot)):
-            yield HeldTask(first, np.array([index]), robot, _placement(loaded, index))
-            first += 1
+            yield HeldTask(np.array([index]), robot, _placement(loaded, index))
 
 
-def trial_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[TrialTask]:
-    """One task for each of the robots, numbered from `first`; none where no trials are requested."""
+def trial_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[TrialTask]:
+    """One task for each of the robots; none where no trials are requested."""
     study = loaded.study
-    if study.trial:
-        for number, (index, robot) in enumerate(robots.items(), start=first):
-            yield TrialTask(
-                number, np.array([index]), robot, _placement(loaded, index), study.contact, interval=study.interval
-            )
+    for index, robot in robots.items() if study.trial else ():
+        placement = _placement(loaded, index)
+        yield TrialTask(np.array([index]), robot, placement, study.contact, interval=study.interval)
 
 
 def _placement(loaded: LoadedStudy, index: int) -> Placement:
@@ -295,21 +285,11 @@ def column_variables(
     for name in MOVING if held else ():
         add(held, name, "held", "held at its pose", f"model {WALLED}")
     for name in sorted(trials[0][0].needed - {"state"}) if trials else ():
-        add(trials, name, "trial", _meaning(name), f"model {WALLED}, {ASSUMPTION}")
+        end = name.rpartition("_")[2]
+        over = f"over what is not stated of a trial: {end} (90 % interval)"
+        add(trials, name, "trial", over if end in ENDS else "mean over a trial", f"model {WALLED}, {ASSUMPTION}")
     if trials:
-        about = {
-            "units": "1",
-            "long_name": "what became of a robot in its trial",
-            "source": "trial in the tube",
-            "flag_values": np.arange(len(TRIAL_STATES), dtype="int8"),
-            "flag_meanings": " ".join(TRIAL_STATES),
-        }
+        about = flag_attributes("what became of a robot in its trial", "trial in the tube", TRIAL_STATES)
         state = np.nan_to_num(gathered(trials, "state", shape)).astype("int8")
         found["trial"] = (tuple(robots), state, about)
     return found
-
-
-def _meaning(name: str) -> str:
-    """Meaning of a value of a trial."""
-    end = name.rpartition("_")[2]
-    return "mean over a trial" if end not in ENDS else f"over what is not stated of a trial: {end} (90 % interval)"

@@ -34,7 +34,7 @@ from spirillum.studies.released_robots import (
 )
 from spirillum.studies.spec import LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import REASONS, ModelTask, Part, gathered
+from spirillum.studies.work import REASONS, ModelTask, Part, flag_attributes, gathered
 from spirillum.swimming.cautions import accuracy_limits
 from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
 from spirillum.swimming.steady import STEADY, Swimming, requirements
@@ -162,7 +162,9 @@ def laid_out(
     import xarray as xr
 
     study = loaded.study
-    robots, shape = _robot_dimensions(loaded)
+    grid = study.grid
+    robots = ("robot",) if grid is None else ("channel", "wavelength", "amplitude")
+    shape = (loaded.count,) if grid is None else (len(grid.channels), len(grid.wavelengths), len(grid.amplitudes))
     count = int(np.prod(shape))
     flat = _gathered(loaded, answers, count)
     if band:
@@ -227,13 +229,6 @@ def _gathered(loaded: LoadedStudy, answers: Iterable[tuple[ModelTask, Part]], co
     return flat
 
 
-def _robot_dimensions(loaded: LoadedStudy) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    grid = loaded.study.grid
-    if grid is None:
-        return ("robot",), (len(loaded.robots),)
-    return ("channel", "wavelength", "amplitude"), (len(grid.channels), len(grid.wavelengths), len(grid.amplitudes))
-
-
 def coordinates_of(loaded: LoadedStudy) -> dict[str, Any]:
     """The question of a study: names, sizes, models, readings, rates."""
     study, robots, source = loaded.study, loaded.robots, "input of the study"
@@ -267,13 +262,8 @@ def _text(names: Sequence[str]) -> Values:
 
 def _attributes_of(name: str) -> dict[str, Any]:
     if name == "outside":
-        return {
-            "units": "1",
-            "long_name": "why there is no answer (0: answered)",
-            "source": "domain of the model, fit of the parts",
-            "flag_values": np.arange(len(REASONS), dtype="int8"),
-            "flag_meanings": " ".join(REASONS),
-        }
+        source = "domain of the model, fit of the parts"
+        return flag_attributes("why there is no answer (0: answered)", source, REASONS)
     if name == "error_estimate":
         return attributes(name)
     for ending, (words, source) in _BAND.items():

@@ -37,7 +37,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.spec import Contact, LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import MOVING, OneRobot, Part, gathered
+from spirillum.studies.work import MOVING, OneRobot, Part, flag_attributes, gathered
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.released_motion import State
 from spirillum.swimming.steady import swim
@@ -222,11 +222,10 @@ def inferred(robot: Robot, seen: Part) -> Part:
     return {name: np.stack(values, axis=-1).reshape(*shape, len(INFERRED_BY)) for name, values in columns.items()}
 
 
-def release_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[ReleaseTask]:
-    """One task for each robot, numbered from `first`; none where none is requested."""
-    if loaded.study.predicted:
-        for number, (index, robot) in enumerate(robots.items(), start=first):
-            yield ReleaseTask(number, np.array([index]), robot, loaded.study.laid_down)
+def release_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[ReleaseTask]:
+    """One task for each robot; none where none is requested."""
+    for index, robot in robots.items() if loaded.study.predicted else ():
+        yield ReleaseTask(np.array([index]), robot, loaded.study.laid_down)
 
 
 def without_answer(parts: Iterable[Part]) -> list[Note]:
@@ -286,14 +285,11 @@ class SettledTask(OneRobot):
         return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
 
 
-def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[SettledTask]:
-    """One task for each robot, numbered from `first`; none where none is requested."""
-    if loaded.study.settled:
-        tails = loaded.count // len(loaded.robots)
-        for number, (index, robot) in enumerate(robots.items(), start=first):
-            yield SettledTask(
-                number, np.array([index]), robot, loaded.placement_of(index // tails), loaded.study.contact
-            )
+def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[SettledTask]:
+    """One task for each robot; none where none is requested."""
+    tails = loaded.count // len(loaded.robots)
+    for index, robot in robots.items() if loaded.study.settled else ():
+        yield SettledTask(np.array([index]), robot, loaded.placement_of(index // tails), loaded.study.contact)
 
 
 def settled_basis(contact: Contact) -> Note:
@@ -344,13 +340,7 @@ def settled_variables(
         )
         found[f"{name}_settled"] = (tuple(robots), gathered(answers, name, shape), about)
     state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(SETTLED_STATES) - 1).astype("int8")
-    about = {
-        "units": "1",
-        "long_name": "outcome for a robot after release",
-        "source": "free motion in the tube",
-        "flag_values": np.arange(len(SETTLED_STATES), dtype="int8"),
-        "flag_meanings": " ".join(word.replace(" ", "-") for word in SETTLED_STATES),
-    }
+    about = flag_attributes("outcome for a robot after release", "free motion in the tube", SETTLED_STATES)
     about_error = attributes(
         "error_estimate",
         meaning="relative error of the speed in steady motion; NaN beyond the yaws that the table was checked for",

@@ -7,7 +7,7 @@ import json
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -23,9 +23,26 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.columns import BandTask, HeldTask, band_tasks, held_tasks, left_out, trial_notes, trial_tasks
+from spirillum.studies.columns import (
+    BandTask,
+    HeldTask,
+    TrialTask,
+    band_tasks,
+    held_tasks,
+    left_out,
+    trial_notes,
+    trial_tasks,
+)
 from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, laid_out, summed
-from spirillum.studies.released_robots import not_settled, release_tasks, settled_basis, settled_tasks, without_answer
+from spirillum.studies.released_robots import (
+    ReleaseTask,
+    SettledTask,
+    not_settled,
+    release_tasks,
+    settled_basis,
+    settled_tasks,
+    without_answer,
+)
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
@@ -40,12 +57,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def kept(task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
+_PART = "part-{:05d}.npz"  # file of a finished answer by the number of its task
+_LARGEST_PART = 1 << 30
+
+
+def kept(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
     """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task."""
-    if folder is None or not (folder / task.file_name).is_file():
+    if folder is None or not (folder / _PART.format(number)).is_file():
         return None
     try:
-        with opened(folder / task.file_name, "a part of a study", _LARGEST_PART) as stream:
+        with opened(folder / _PART.format(number), "a part of a study", _LARGEST_PART) as stream:
             if any(
                 not (item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size)
                 for item in zipfile.ZipFile(stream).infolist()
@@ -60,17 +81,17 @@ def kept(task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part
     return part if whole and fits else None
 
 
-_LARGEST_PART = 1 << 30
-
-
-def keep(task: StudyTask, part: Part, folder: Path | None) -> None:
+def keep(number: int, part: Part, folder: Path | None) -> None:
     """Keep a finished answer."""
     if folder is not None:
-        with atomic_write(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
+        with atomic_write(folder / _PART.format(number), replace="any") as path, path.open("wb") as stream:
             np.savez(stream, **cast("dict[str, Any]", part))
 
 
 Progress = Callable[[str, int, int], None]  #: Called with what is being done, steps done and steps in all.
+
+
+_Task = TypeVar("_Task", bound=StudyTask)
 
 
 def study_fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
@@ -88,17 +109,20 @@ def computed_study(
     pool: WorkerPool | None = None,
 ) -> xr.Dataset:
     """The dataset of a study; finished parts are kept in and reused from the folder `parts`."""
-    todo: list[ModelTask | BandTask] = list(tasks(loaded))
-    todo += band_tasks(loaded, len(todo))
     followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial
     with_table = _with_table(loaded) if followed else {}
-    runs = list(release_tasks(loaded, with_table, len(todo)))
-    settled = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
-    holding = list(held_tasks(loaded, len(todo) + len(runs) + len(settled)))
-    trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(settled) + len(holding)))
-    requested: list[StudyTask] = [*todo, *runs, *settled, *holding, *trials]
-    found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in requested}
-    missing = [task for task in requested if found[task.number] is None]
+    requested: list[StudyTask] = [
+        *tasks(loaded),
+        *band_tasks(loaded),
+        *release_tasks(loaded, with_table),
+        *settled_tasks(loaded, with_table),
+        *held_tasks(loaded),
+        *trial_tasks(loaded, with_table),
+    ]
+    readings = len(loaded.study.friction)
+    found = [kept(number, task, parts, task.leading(readings)) for number, task in enumerate(requested)]
+    numbers = [number for number, part in enumerate(found) if part is None]
+    missing = [requested[number] for number in numbers]
     done = len(requested) - len(missing)
     if missing:
         walled = (task for task in missing if isinstance(task, ModelTask) and find_swimmer_model(task.model).placed)
@@ -107,26 +131,23 @@ def computed_study(
             words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
             tell(f"{ESTIMATE}{words}, in some 10 s of one core each, up to 64 at a time; `prepare` makes tables", 0, 0)
         tell(missing[0].words, done, len(requested))
-    jobs = (task.job(loaded, observed) for task in missing)
+    jobs = (requested[number].job(loaded, observed)._replace(number=number) for number in numbers)
     at_work = _worth(missing, pool or WorkerPool())
     for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
-        task = requested[job.task.number]
-        found[task.number] = part
-        keep(task, part, parts)
+        found[job.number] = part
+        keep(job.number, part, parts)
         done += 1
-        tell(task.words, done, len(requested))
+        tell(requested[job.number].words, done, len(requested))
     tell("dataset", len(requested), len(requested))
-    parts_of = {number: part for number, part in found.items() if part is not None}
-    answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, ModelTask)]
-    band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
-    beside = BesideModels(
-        released=[(task, parts_of[task.number]) for task in runs],
-        settled=[(task, parts_of[task.number]) for task in settled],
-        held=[(task, parts_of[task.number]) for task in holding],
-        trials=[(task, parts_of[task.number]) for task in trials],
-    )
+
+    def answered(kind: type[_Task]) -> list[tuple[_Task, Part]]:
+        pairs = zip(requested, found, strict=True)
+        return [(task, part) for task, part in pairs if isinstance(task, kind) and part is not None]
+
+    answers, band = answered(ModelTask), answered(BandTask)
+    beside = BesideModels(answered(ReleaseTask), answered(SettledTask), answered(HeldTask), answered(TrialTask))
     warnings = warnings_of(loaded)
-    warnings += [settled_basis(loaded.study.contact)] if settled else []
+    warnings += [settled_basis(loaded.study.contact)] if beside.settled else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += left_out(band)
     if followed:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -88,18 +88,12 @@ Part = dict[str, Values]  #: Arrays of one task: (robots, friction models) or (r
 class StudyTask(ABC):
     """A block of robots of a study and how it is answered, as a value that other processes can take."""
 
-    number: int
     indices: Indices  #: Indices of the robots in the flat order of the study.
 
     @property
     def size(self) -> int:
         """Number of robots."""
         return int(self.indices.size)
-
-    @property
-    def file_name(self) -> str:
-        """Name of the file that holds its finished answer."""
-        return f"part-{self.number:05d}.npz"
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -143,6 +137,7 @@ class StudyJob(NamedTuple):
     loaded: LoadedStudy
     """The study without robots, or with those of the task where their posterior draws are requested."""
     observed: ObservedArrays | None
+    number: int = 0  #: Of the task among all of its study.
 
 
 def run_job(job: StudyJob) -> Part:
@@ -221,9 +216,8 @@ class ModelTask(OneModel):
             found = [_swum(quick, r, tail, motor) for r in readings]
             part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
         if study.assumed_motor_rates and self.batch.electrics is not None:
-            electrics = self.batch.electrics
-            assert electrics is not None  # noqa: S101 - checked by the caller
-            driven = np.outer(study.assumed_motor_rates, np.broadcast_to(electrics.polarity, (self.batch.size,)))
+            polarity = np.broadcast_to(self.batch.electrics.polarity, (self.batch.size,))
+            driven = np.outer(study.assumed_motor_rates, polarity)
             curves = [_curve(quick, reading, driven) for reading in readings]
             part |= {
                 f"{name}_at_assumed_rate": np.stack([curve[name] for curve in curves], axis=1) for name in AT_RATES
@@ -243,6 +237,13 @@ class OneRobot(StudyTask):
         return int(self.indices[0])
 
 
+def flag_attributes(meaning: str, source: str, names: Sequence[str]) -> dict[str, Any]:
+    """Attributes of a variable whose values are indices of names."""
+    about = {"units": "1", "long_name": meaning, "source": source}
+    values = np.arange(len(names), dtype="int8")
+    return {**about, "flag_values": values, "flag_meanings": " ".join(name.replace(" ", "-") for name in names)}
+
+
 def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequence[int]) -> Values:
     """A quantity of robots that were followed one by one, over all robots of the study; NaN for those that were not."""
     first = answers[0][1][name]
@@ -254,18 +255,12 @@ def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequenc
 
 def tasks(loaded: LoadedStudy) -> Iterator[ModelTask]:
     """All tasks of a study, always in the same order."""
-    number = 0
     for indices, batch in groups(loaded):
-        for model in loaded.study.models:
-            for cut, block in batch.blocks(_block_size(find_swimmer_model(model))):
-                yield ModelTask(number, indices[cut], model, block)
-                number += 1
-
-
-def _block_size(model: SwimmerModel) -> int:
-    if model.closed_form:
-        return BLOCK
-    return _PLACED_BLOCK if model.placed else _SMALL_BLOCK
+        for name in loaded.study.models:
+            model = find_swimmer_model(name)
+            size = BLOCK if model.closed_form else _PLACED_BLOCK if model.placed else _SMALL_BLOCK
+            for cut, block in batch.blocks(size):
+                yield ModelTask(indices[cut], name, block)
 
 
 def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:

@@ -66,7 +66,7 @@ class KnownResistance(SwimmerModel):
         self, model: SwimmerModel, whole: Samples, load: Samples | None = None, flow: MeanFlow | None = None
     ) -> None:
         """Answer with resistances of whole robots, (robots, 3, 3); `model` answers all else."""
-        self.name = model.name  # type: ignore[misc]
+        self.name = model.name
         self.placed = model.placed  # type: ignore[misc]
         self.model, self.whole, self._load, self._flow = model, whole, load, flow
 
