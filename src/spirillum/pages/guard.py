@@ -111,10 +111,6 @@ class Guard:
             return False
         return address.is_loopback if self._loopback else True
 
-    def own_origin(self, origin: str, host: str) -> bool:
-        """Whether an `Origin` header names the page that this server shows under that `Host`."""
-        return origin == f"http://{host}"
-
     def right_key(self, key: str) -> bool:
         """Whether it is the key, in constant time."""
         return secrets.compare_digest(key.encode(), self.key.encode())

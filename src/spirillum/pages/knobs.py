@@ -145,17 +145,10 @@ class Settings:
 
 
 def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "field": knob.field,
-        "label": knob.label,
-        "group": knob.group,
-        "unit": knob.unit,
-        "choices": list(knob.choices),
-        "note": knob.note,
-        "logarithmic": knob.logarithmic,
-        "unset": knob.unset,
-        "changed": knob.field in settings.overrides or knob.field.removeprefix("run.") in settings.run,
-    }
+    names = ("field", "label", "group", "unit", "note", "logarithmic", "unset")
+    changed = knob.field in settings.overrides or knob.field.removeprefix("run.") in settings.run
+    found: dict[str, Any] = {name: getattr(knob, name) for name in names}
+    found |= {"choices": list(knob.choices), "changed": changed}
     if knob.field.startswith("run."):
         short = knob.field.removeprefix("run.")
         given = settings.run.get(short)
@@ -167,7 +160,8 @@ def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
         return found | {"value": si}
     if si is None:
         return found | {"value": None, "low": knob.low, "high": knob.high}
-    unit = _unit_of(knob.unit, abs(float(si)))
+    limit, smaller = _SMALL.get(knob.unit, (0.0, knob.unit))
+    unit = smaller if abs(float(si)) < limit else knob.unit
     value = float(si) / parse_quantity(f"1 {unit}", KINDS[_UNIT_KINDS.get(unit, "length")])
     low, high = _range(knob, value) if unit == knob.unit else _around(value)
     return found | {"unit": unit, "value": float(f"{value:.12g}"), "low": low, "high": high}
@@ -183,11 +177,6 @@ _UNIT_KINDS = {
 }
 _SMALL = {"mm": (2e-5, "um"), "Pa s": (0.02, "mPa s")}
 """Unit of a control to the SI size below which it is shown in another, as a bacterium's."""
-
-
-def _unit_of(unit: str, si: float) -> str:
-    limit, smaller = _SMALL.get(unit, (0.0, unit))
-    return smaller if si < limit else unit
 
 
 def _range(knob: Knob, value: float) -> tuple[float, float]:

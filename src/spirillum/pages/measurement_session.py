@@ -371,8 +371,6 @@ class MeasurementSession:
         """A file of the results by its name; None if there is none of that name."""
         with self._lock:
             for kind, found in self._results.items():
-                if name in found["files"]:
-                    return self._folders[kind] / name
-                if name in found.get("figures", ()):
+                if name in (*found["files"], *found.get("figures", ())):
                     return self._folders[kind] / name
         return None

@@ -172,6 +172,7 @@ class PageRobot:
         if name != "own" and name not in preset_names():
             raise InputError(f"preset {name[:60]!r}; allowed: {', '.join(preset_names())}")
         self._become(Settings(own if name == "own" else name), "")
+        self.set_duty()
 
     def swap(self, source: Robot, overrides: Mapping[str, str]) -> None:
         """Another robot, with other values of some fields."""

@@ -9,9 +9,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.run_file import open_run, poses_of, robot_of
 from spirillum.errors import InputError
-from spirillum.files import scratch_folder
 from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.robot_data import SERIES, finite, shape_of, thinned
+from spirillum.pages.video_store import read_upload
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,15 +48,7 @@ def replay_of_run(dataset: xr.Dataset) -> dict[str, Any]:
 
 def replay_of_upload(content: bytes) -> dict[str, Any]:
     """A run to replay from the bytes of its file."""
-    if len(content) > LARGEST_RUN:
-        raise InputError(f"the file has {len(content) >> 20} MB; allowed: at most {LARGEST_RUN >> 20} MB")
-    with scratch_folder() as folder:
-        path = folder / "run.nc"
-        path.write_bytes(content)
-        try:
-            return replay_of_run(open_run(path))
-        except InputError as error:
-            raise InputError(str(error).replace(str(path), "the file")) from error
+    return read_upload(content, "run.nc", lambda path: replay_of_run(open_run(path)))
 
 
 def replay_of_swimmer(swimmer: PageRobot, run: dict[str, Any]) -> dict[str, Any]:
@@ -78,7 +70,7 @@ def _is_series(dataset: xr.Dataset, name: str) -> bool:
 def _series(dataset: xr.Dataset, name: str, chosen: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[float | None]:
     if not _is_series(dataset, name):
         return []
-    return [finite(float(value)) for value in np.asarray(dataset[name].values, dtype=float)[chosen]]
+    return [finite(value) for value in np.asarray(dataset[name].values, dtype=float)[chosen].tolist()]
 
 
 _MOST_OF_CURVE = 3_000  # samples of a curve

@@ -105,22 +105,18 @@ def quantity_list(rows: Mapping[str, Any] | None = None) -> dict[str, dict[str, 
         item = QUANTITIES[name]
         value = (rows or {}).get(name, {}).get("value")
         unit = display_unit(value, item.unit)
-        factor = 1.0 if unit == item.unit else 1.0 / _factor(unit)
+        factor = 1.0 if unit == item.unit else shown_in(1.0, unit)
         label = _LABELS.get(name, name.replace("_", " "))
         meaning = item.meaning + (f" ({item.source})" if item.source else "")
         found[name] = {"label": label, "unit": "" if unit == "1" else unit, "factor": factor, "meaning": meaning}
     return found
 
 
-def _factor(unit: str) -> float:
-    return 1.0 / shown_in(1.0, unit)
-
-
 def prediction_answer(prediction: Prediction) -> dict[str, Any]:
     """A prediction as the page shows it; SI, None for what does not apply."""
     answer = prediction.to_dict()
     rows = {
-        name: {key: _finite(answer[name].get(key)) for key in ("value", "low", "high")}
+        name: {key: finite(answer[name].get(key)) for key in ("value", "low", "high")}
         for name in TABLE
         if isinstance(answer.get(name), dict)
     }
@@ -139,7 +135,7 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "columns": dict.fromkeys(("trial", "steady")) if answer["model"] == WALLED else {},
         "forces": found,
         "band": "band" in answer,
-        "error": _finite(error.get("value")),
+        "error": finite(error.get("value")),
         "against": error.get("against", ""),
         "statement": error.get("statement", ""),
         "others": answer.get("other_models", {}).get("statement", ""),
@@ -151,7 +147,7 @@ def released_answer(motion: ReleasedMotion) -> dict[str, Any]:
     """A trial or steady motion as the page shows it: SI values of the rows, or the reason why there are none."""
     state = motion.basis.get("state", "")
     title = motion.reason or f"{state}; {motion.basis['assumption']}"
-    return {"title": title, "rows": {name: _finite(motion.values.get(name)) for name in TABLE}}
+    return {"title": title, "rows": {name: finite(motion.values.get(name)) for name in TABLE}}
 
 
 def axial_forces_of(prediction: Prediction) -> list[dict[str, Any]]:
@@ -167,10 +163,6 @@ def axial_forces_of(prediction: Prediction) -> list[dict[str, Any]]:
         for name, at, value in parts
         if math.isfinite(value)
     ]
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 MOST = 12_000  #: Samples that are kept; beyond it every other one is dropped.
@@ -226,9 +218,9 @@ class SampleRecording:
         }
 
 
-def finite(value: float) -> float | None:
-    """A number, or None where it has no value: JSON knows no NaN."""
-    return float(value) if math.isfinite(value) else None
+def finite(value: Any) -> float | None:
+    """A number, or None for anything else and for NaN, which JSON does not know."""
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 def thinned(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

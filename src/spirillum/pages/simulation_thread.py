@@ -79,6 +79,24 @@ class SimulationThread:
         self._behind = 0.0
         self._lock = threading.Lock()
         self.version, self.scene, self.frame = 0, "", ""
+        self._actions: dict[str, Callable[[PageRobot, Mapping[str, Any]], None]] = {
+            "set": self._set,
+            "preset": lambda swimmer, command: swimmer.preset(text_of(command, "value"), self._own),
+            "tail": self._tail,
+            "undo": lambda swimmer, _: swimmer.undo(),
+            "redo": lambda swimmer, _: swimmer.undo(forward=True),
+            "restart": self._restart,
+            "remote": self._remote,
+            "duty": lambda swimmer, command: swimmer.set_duty(number_of(command, 0.0, 1.0)),
+            "play": self._play,
+            "step": self._step,
+            "pace": self._set_pace,
+            "compare": self._compare,
+            "flow": self._flow,
+            "prepare": self._prepare,
+            "leave-off": self._leave_off,
+            "wake": lambda *_: None,  # only to be listened to
+        }
         self._threads = [
             threading.Thread(target=self._run, name="page: motion", daemon=True),
             threading.Thread(target=self._build, name="page: numbers", daemon=True),
@@ -220,32 +238,21 @@ class SimulationThread:
         return changed
 
     def _do(self, command: Mapping[str, Any]) -> None:
-        what = command.get("do")
+        what = str(command.get("do"))
         swimmer = self._swimmers[self.swimmer_number(command.get("lane", 0))]
-        action = _ACTIONS.get(str(what))
-        if action is None:
-            raise InputError(f"do = {str(what)[:40]!r}; allowed: {', '.join(_ACTIONS)}")
-        action(self, swimmer, command)
+        if what not in self._actions:
+            raise InputError(f"do = {what[:40]!r}; allowed: {', '.join(self._actions)}")
+        self._actions[what](swimmer, command)
 
     def _set(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         name, value = text_of(command, "field"), text_of(command, "value")
         if name != "run.flow" or not swimmer.flow(value):
             swimmer.set(name, value)
 
-    def _preset(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
-        swimmer.preset(text_of(command, "value"), self._own)
-        swimmer.set_duty()
-
     def _tail(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         if self._study is None:
             raise InputError("tail: no study is shown; allowed: a study first")
         swimmer.swap(*self._study.tail(command))
-
-    def _undo(self, swimmer: PageRobot, _command: Mapping[str, Any]) -> None:
-        swimmer.undo()
-
-    def _redo(self, swimmer: PageRobot, _command: Mapping[str, Any]) -> None:
-        swimmer.undo(forward=True)
 
     def _restart(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
         for swimmer in self._swimmers:
@@ -253,9 +260,6 @@ class SimulationThread:
 
     def _remote(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         swimmer.remote = bool(command.get("value"))
-
-    def _duty(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
-        swimmer.set_duty(number_of(command, 0.0, 1.0))
 
     def _flow(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         if command.get("value"):
@@ -274,9 +278,6 @@ class SimulationThread:
 
     def _set_pace(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
         self._pace = number_of(command, SLOWEST_PACE, FASTEST_PACE)
-
-    def _wake(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
-        """Only to be listened to."""
 
     def _compare(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
         if not command.get("value"):
@@ -457,23 +458,3 @@ class SimulationThread:
         swimmers = [swimmer.frame() for swimmer in self._swimmers]
         self.frame = json.dumps({"t": "frame", "lanes": swimmers, "playing": self._playing, "behind": self._behind})
         self._publish()
-
-
-_ACTIONS: dict[str, Callable[[SimulationThread, PageRobot, Mapping[str, Any]], None]] = {
-    "set": SimulationThread._set,  # noqa: SLF001 - its own
-    "preset": SimulationThread._preset,  # noqa: SLF001
-    "tail": SimulationThread._tail,  # noqa: SLF001
-    "undo": SimulationThread._undo,  # noqa: SLF001
-    "redo": SimulationThread._redo,  # noqa: SLF001
-    "restart": SimulationThread._restart,  # noqa: SLF001
-    "remote": SimulationThread._remote,  # noqa: SLF001
-    "duty": SimulationThread._duty,  # noqa: SLF001
-    "play": SimulationThread._play,  # noqa: SLF001
-    "step": SimulationThread._step,  # noqa: SLF001
-    "pace": SimulationThread._set_pace,  # noqa: SLF001
-    "compare": SimulationThread._compare,  # noqa: SLF001
-    "flow": SimulationThread._flow,  # noqa: SLF001
-    "prepare": SimulationThread._prepare,  # noqa: SLF001
-    "leave-off": SimulationThread._leave_off,  # noqa: SLF001
-    "wake": SimulationThread._wake,  # noqa: SLF001
-}

@@ -11,7 +11,8 @@ import numpy as np
 
 from spirillum.dynamics.run_file import robot_of_settings
 from spirillum.errors import InputError
-from spirillum.files import loaded_netcdf, scratch_folder
+from spirillum.files import loaded_netcdf
+from spirillum.pages.video_store import read_upload
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -78,13 +79,7 @@ class StudyPicture:
 
 def sent_study(content: bytes) -> StudyPicture:
     """A study from the bytes of its file."""
-    with scratch_folder() as folder:
-        path = folder / "dataset.nc"
-        path.write_bytes(content)
-        try:
-            return StudyPicture(loaded_netcdf(path, _WHAT, LARGEST_STUDY_SENT))
-        except InputError as error:
-            raise InputError(str(error).replace(str(path), "the file")) from error
+    return read_upload(content, "dataset.nc", lambda path: StudyPicture(loaded_netcdf(path, _WHAT, LARGEST_STUDY_SENT)))
 
 
 def _robots(dataset: xr.Dataset) -> list[Robot]:

@@ -6,21 +6,23 @@ import math
 import re
 import shutil
 import threading
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from starlette.requests import Request
 
 from spirillum.errors import InputError
+from spirillum.files import scratch_folder
 from spirillum.optional_dependencies import import_optional
 
 if TYPE_CHECKING:
     import numpy as np
 
     from spirillum.vision.video.frames import Video
+
+_Read = TypeVar("_Read")
 
 
 def plain(sentence: str, folder: Path) -> str:
@@ -35,6 +37,17 @@ def plain_names(folder: Path) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(plain(str(error), folder), [plain(one, folder) for one in error.problems]) from error
+
+
+def read_upload(content: bytes, name: str, read: Callable[[Path], _Read]) -> _Read:
+    """What is read of an uploaded file; messages of errors call it the file."""
+    with scratch_folder() as folder:
+        path = folder / name
+        path.write_bytes(content)
+        try:
+            return read(path)
+        except InputError as error:
+            raise InputError(str(error).replace(str(path), "the file")) from error
 
 
 _LARGEST_TOGETHER = 128 << 20  # bytes of all files and messages in memory at once. Videos are written to the disk.
@@ -83,12 +96,6 @@ _SPARE = 512 << 20  # bytes that stay free on the disk
 _QUALITY = 92
 
 
-@dataclass(frozen=True)
-class _Film:
-    path: Path
-    video: Video
-
-
 class VideoStore:
     """Videos by the names of their trials; its methods are thread-safe."""
 
@@ -97,7 +104,7 @@ class VideoStore:
         self._folder = folder
         self._lock = threading.RLock()
         self._decoding = threading.Lock()  # one film at a time: a frame of many pixels takes much memory
-        self._films: dict[str, _Film] = {}
+        self._films: dict[str, Video] = {}
         self._stated: dict[Path, int] = {}
         self._count = 0
 
@@ -144,28 +151,28 @@ class VideoStore:
             path.unlink(missing_ok=True)
             raise
         with self._lock:
-            self._films[path.stem] = _Film(path, video)
+            self._films[path.stem] = video
         return path.stem
 
     def remove(self, name: str) -> None:
         """Remove a video."""
         with self._lock:
-            film = self._films.pop(name, None)
-        if film is not None:
-            film.path.unlink(missing_ok=True)
+            video = self._films.pop(name, None)
+        if video is not None:
+            video.path.unlink(missing_ok=True)
 
     def video(self, name: str) -> Video:
         """Open a video."""
         with self._lock:
-            film = self._films.get(name)
-        if film is None:
+            video = self._films.get(name)
+        if video is None:
             raise InputError(f"film {name[:40]!r}; allowed: an uploaded video")
-        return film.video
+        return video
 
     def paths(self) -> list[Path]:
         """Files of the videos, in the order of their upload."""
         with self._lock:
-            return [film.path for film in self._films.values()]
+            return [video.path for video in self._films.values()]
 
     def describe(self) -> list[dict[str, Any]]:
         """Videos as the page lists them."""
@@ -173,12 +180,12 @@ class VideoStore:
             return [
                 {
                     "name": name,
-                    "size": list(film.video.size),
-                    "duration": film.video.duration,
-                    "rate": film.video.rate,
-                    "synthetic": "synthetic" in film.video.words.lower(),
+                    "size": list(video.size),
+                    "duration": video.duration,
+                    "rate": video.rate,
+                    "synthetic": "synthetic" in video.words.lower(),
                 }
-                for name, film in self._films.items()
+                for name, video in self._films.items()
             ]
 
     def picture(self, name: str, time: float) -> bytes:

@@ -19,7 +19,17 @@ from spirillum.units import Hz
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_panels import spread
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, label_of_model, look_of_model, plain, styled
+from spirillum.view.figures.style import (
+    COLOURS,
+    PAGE,
+    PATCH,
+    UnitPrefix,
+    in_words,
+    label_of_model,
+    look_of_model,
+    plain,
+    styled,
+)
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
@@ -45,8 +55,7 @@ def posterior_figure(found: Calibrated) -> Figure:
     count = len(names)
     colour = look_of_model(found.problem.model.name).colour
     with styled():
-        synthetic = "synthetic, no measured data" if found.experiment.synthetic else "observed"
-        words = f"{plain(found.experiment.source, 40)} ({synthetic}), model {found.problem.model.name}"
+        words = f"{_source(found)}, model {found.problem.model.name}"
         words += "; contours contain 50 and 95 % of the draws" if count > 1 else ""
         words += f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
         sheet = Sheet(
@@ -230,10 +239,7 @@ def _fit_words(found: Calibrated, channel: int | None = None) -> str:
 
 
 def _with_unit(value: float, unit: str) -> str:
-    if not unit:
-        return f"{value:.3g}"
-    scale = UnitPrefix.of(np.abs(np.array([value])), unit)
-    return f"{value / scale.factor:.3g} {scale.unit}"
+    return in_words(value, unit, 3) if unit else f"{value:.3g}"
 
 
 def observed_figure(found: Calibrated, channel: int) -> Figure:
@@ -385,7 +391,10 @@ def residual_figure(found: Calibrated) -> Figure:
             legend=handles,
         )
         add_letters(sheet.panels.flat)
-        order = sorted(range(experiment.size), key=lambda n: (*_place(found, n),))
+        tails = [robot.tail for robot in experiment.robots]
+        order = sorted(
+            range(experiment.size), key=lambda n: (experiment.channel[n], tails[n].wavelength, tails[n].amplitude)
+        )
         edges = [n for n in range(1, len(order)) if experiment.channel[order[n]] != experiment.channel[order[n - 1]]]
         for name, axes in zip(names, sheet.panels.flat, strict=True):
             _draw_residuals(axes, found, name, order)
@@ -396,8 +405,7 @@ def residual_figure(found: Calibrated) -> Figure:
         last = sheet.panels[-1, 0]
         last.set_xlabel("tail: wavelength x amplitude (mm)")
         shown = spread(len(order), _MOST_NAMES)
-        tails = [experiment.robots[order[n]].tail for n in shown]
-        names_of_tails = [f"{tail.wavelength * 1e3:g} x {tail.amplitude * 1e3:g}" for tail in tails]
+        names_of_tails = [f"{tails[order[n]].wavelength * 1e3:g} x {tails[order[n]].amplitude * 1e3:g}" for n in shown]
         last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=7)
         last.tick_params(labelbottom=True)
         low, high = last.get_ylim()
@@ -413,11 +421,6 @@ def residual_figure(found: Calibrated) -> Figure:
                 size=8,
             )
         return sheet.finished()
-
-
-def _place(found: Calibrated, n: int) -> tuple[int, float, float]:
-    robot = found.experiment.robots[n]
-    return int(found.experiment.channel[n]), robot.tail.wavelength, robot.tail.amplitude
 
 
 def _draw_residuals(axes: Axes, found: Calibrated, name: Quantity, order: list[int]) -> None:

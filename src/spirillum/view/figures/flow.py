@@ -16,10 +16,10 @@ from matplotlib.ticker import NullLocator
 
 from spirillum.arrays import Values
 from spirillum.units import Hz
-from spirillum.view.figures.scene import HALO
+from spirillum.view.figures.scene import label
 from spirillum.view.figures.section import draw_glass, draw_section
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, in_words, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -247,7 +247,7 @@ def _draw_heading(axes: Axes, flow: Flow, view: _View) -> None:
         )
     )
     x, y = 0.5 * (start + stop) + np.array([0.0, 0.28 * body.diameter / unit])
-    axes.text(x, y, "$U_x$", ha="center", va="center", size=9, color="black", path_effects=[HALO], zorder=10)
+    label(axes, x, y, "$U_x$", size=9, color="black")
 
 
 def _at_glass(view: _View) -> tuple[Values, Values]:
@@ -277,9 +277,8 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
     plane = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
     where = f"{plane}, origin at the body's mid-length"
     yield f"{where} · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
-    speed = UnitPrefix.of(np.array([motion.forward_velocity]), "m/s")
     yield (
-        f"$U_x$ = {motion.forward_velocity / speed.factor:.4g} {speed.unit}, "
+        f"$U_x$ = {in_words(motion.forward_velocity, 'm/s')}, "
         f"tail {motion.tail_rotation_rate / Hz:.4g} Hz, body {motion.body_rotation_rate / Hz:.4g} Hz"
     )
     if flow.seat is not None:
@@ -290,8 +289,7 @@ def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
     """Pose of the robot in its tube, and the imposed flow."""
     placement, motion = flow.prediction.placement, flow.prediction
     film = placement["gap"]["value"]
-    own = UnitPrefix.of(np.array([film - flow.lifted]), "m")
-    in_run = f" (in the run {(film - flow.lifted) / own.factor:.4g} {own.unit})" if flow.lifted > 0.0 else ""
+    in_run = f" (in the run {in_words(film - flow.lifted, 'm')})" if flow.lifted > 0.0 else ""
     yield f"gap {film / lengths.factor:.4g} {lengths.unit}{in_run}"
     if flow.seat is not None and flow.seat.pitch:
         yield f"pitch {np.degrees(flow.seat.pitch):.4g}°"
@@ -299,8 +297,7 @@ def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
         yield f"yaw {np.degrees(flow.seat.yaw):.4g}°"
     if "tail_drop" in placement:
         yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
-    mean = UnitPrefix.of(np.array([motion.plug_velocity]), "m/s")
-    through = f"{motion.plug_velocity / mean.factor:.4g} {mean.unit}"
+    through = in_words(motion.plug_velocity, "m/s")
     if motion.motion == "free":  # a moment of a run, which states how its ends and an imposed flow drive the fluid
         yield f"mean flow {through}"
     elif motion.batch.placement.flow is not None:
@@ -321,8 +318,7 @@ def _notes(flow: Flow, view: _View) -> Iterator[str]:
     yield f"Lines: {lines}; {', '.join(drawn)}."
     held = ""
     if flow.held_force > 0:
-        force = UnitPrefix.of(np.array([flow.held_force]), "N")
         words = "Weight and contact push it sideways with" if flow.prediction.motion == "free" else _HELD
-        held = f" {words} {flow.held_force / force.factor:.2g} {force.unit}."
+        held = f" {words} {in_words(flow.held_force, 'N', 2)}."
     walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."
     yield f"{walls}{held} Computed, no measured data."

@@ -23,10 +23,11 @@ from spirillum.view.figures.scene import (
     draw_solid,
     draw_wire,
     label,
-    length_words,
+    round_length,
+    tail_words,
     thin_line,
 )
-from spirillum.view.figures.style import COLOURS, PAGE, new_figure, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, in_words, new_figure, plain, styled
 
 
 def draw_dimensions(axes: Axes, s: DrawingLayout) -> None:
@@ -137,17 +138,12 @@ _FLUID, _GLASS, _GLASS_EDGE = "#eef5f9", "#cfe0ea", "#54788e"
 
 def robot_words(robot: Robot) -> str:
     """Alternative text of the picture."""
-    body, tail, channel = robot.body, robot.tail, robot.channel
-    where = (
-        f"on the floor of a channel of {length_words(channel.diameter)} diameter" if channel else "without a channel"
-    )
+    where = "without a channel"
+    if robot.channel is not None:
+        where = f"on the floor of a channel of {in_words(robot.channel.diameter, 'm')} diameter"
     towards = "right" if _sense(robot) > 0 else "left"
-    return (
-        f"A {body.shape} body of {length_words(body.diameter)} diameter and {length_words(body.length)} length, "
-        f"a {tail.handedness}-handed helical tail of {length_words(tail.length)} length, "
-        f"{length_words(tail.wavelength)} wavelength and {length_words(tail.amplitude)} amplitude behind it, {where}; "
-        f"side view to scale, swimming to the {towards}. Computed geometry, not a photograph."
-    )
+    view = f"side view to scale, swimming to the {towards}. Computed geometry, not a photograph."
+    return f"A {tail_words(robot)}, {where}; {view}"
 
 
 def _sense(robot: Robot) -> float:
@@ -287,23 +283,16 @@ def _draw_frame(axes: Axes, s: DrawingLayout) -> None:
         color=FAINT,
     )
     _compass(axes, s)
-    length, text = _round_length(0.16 * s.total * s.scale.factor)
+    length = round_length(0.16 * s.total * s.scale.factor)
     end = s.right - 0.02 * s.total
     start, z = end - length / s.scale.factor, s.bottom + 0.030 * s.total
     axes.plot([start, end], [z, z], color=INK, linewidth=2.0, solid_capstyle="butt", zorder=12)
-    label(axes, 0.5 * (start + end), z + 0.022 * s.total, text)
-
-
-def _round_length(about: float) -> tuple[float, str]:
-    """A length of 1, 2 or 5 times a power of ten, m, not above `about`."""
-    power = 10.0 ** np.floor(np.log10(about))
-    length = float(next(m * power for m in (5.0, 2.0, 1.0) if m * power <= about * 1.0001))
-    return length, length_words(length)
+    label(axes, 0.5 * (start + end), z + 0.022 * s.total, in_words(length, "m"))
 
 
 def _compass(axes: Axes, s: DrawingLayout) -> None:
     x, z, size = s.left + 0.025 * s.total, s.bottom + 0.025 * s.total, 0.055 * s.total
-    for dx, dz, name in _directions(size):
+    for dx, dz, name in ((size, 0.0, "$x$"), (0.0, size, "$z$")):
         axes.add_patch(
             FancyArrowPatch(
                 (x, z),
@@ -317,8 +306,3 @@ def _compass(axes: Axes, s: DrawingLayout) -> None:
             )
         )
         label(axes, x + 1.22 * dx, z + 1.22 * dz, name)
-
-
-def _directions(size: float) -> Iterator[tuple[float, float, str]]:
-    yield size, 0.0, "$x$"
-    yield 0.0, size, "$z$"

@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from spirillum.arrays import Values
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.robot import Robot
-from spirillum.view.figures.style import PAGE, UnitPrefix
+from spirillum.view.figures.style import PAGE, UnitPrefix, in_words
 
 Metal = tuple[str, str, str]  #: Colours of a shaded surface: shadow, middle, highlight.
 
@@ -215,8 +215,7 @@ class DrawingLayout:
 
     def words(self, symbol: str, value: float) -> str:
         """``symbol = value unit`` of an SI length."""
-        scale = UnitPrefix.of(np.array([value]), "m")
-        return f"${symbol}$ = {value / scale.factor:.4g} {scale.unit}"
+        return f"${symbol}$ = {in_words(value, 'm')}"
 
 
 def dimension_line(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -239,7 +238,17 @@ def label(axes: Axes, x: float, z: float, text: str, **more: str | float) -> Non
     axes.text(x, z, text, zorder=13, path_effects=[HALO], **options)  # type: ignore[arg-type]
 
 
-def length_words(value: float) -> str:
-    """An SI length in a readable unit."""
-    scale = UnitPrefix.of(np.array([value]), "m")
-    return f"{value / scale.factor:.4g} {scale.unit}"
+def round_length(about: float) -> float:
+    """A length of 1, 2 or 5 times a power of ten, at most `about`."""
+    power = 10.0 ** np.floor(np.log10(about))
+    return float(next(m * power for m in (5.0, 2.0, 1.0) if m * power <= about * 1.0001))
+
+
+def tail_words(robot: Robot) -> str:
+    """Shapes and sizes of body and tail, for the alternative text of a picture."""
+    body, tail = robot.body, robot.tail
+    return (
+        f"{body.shape} body of {in_words(body.diameter, 'm')} diameter and {in_words(body.length, 'm')} length, "
+        f"a {tail.handedness}-handed helical tail of {in_words(tail.length, 'm')} length, "
+        f"{in_words(tail.wavelength, 'm')} wavelength and {in_words(tail.amplitude, 'm')} amplitude behind it"
+    )

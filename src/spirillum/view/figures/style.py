@@ -113,6 +113,12 @@ class UnitPrefix:
         return values / self.factor
 
 
+def in_words(value: float, unit: str, digits: int = 4) -> str:
+    """An SI value with a unit whose prefix makes it readable."""
+    scale = UnitPrefix.of(np.array([value]), unit)
+    return f"{value / scale.factor:.{digits}g} {scale.unit}"
+
+
 @lru_cache(maxsize=1)
 def _settings() -> dict[Any, Any]:
     with warnings.catch_warnings():

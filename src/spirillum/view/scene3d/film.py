@@ -20,7 +20,7 @@ from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.units import display_unit, show
 from spirillum.view.figures.run_panels import silhouette
-from spirillum.view.figures.scene import FAINT, INK
+from spirillum.view.figures.scene import FAINT, INK, round_length
 from spirillum.view.figures.style import COLOURS, with_micro
 from spirillum.view.scene3d.rendering import FILMS, film_writer
 from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
@@ -256,17 +256,13 @@ class _Shots:
             for time in times:
                 pose = self._poses.at(float(time))
                 scene.place(pose)
-                scene.look(self._camera_at(pose, first))
+                shift = (pose.position - first.position) * self._free
+                scene.look(self._camera.moved(shift) if self._follows else self._camera)
                 image = words(scene.image())
                 stamp.write(image, float(time))
                 if self._inset is not None:
                     self._inset.write(image, float(time), pose)
                 yield image
-
-    def _camera_at(self, pose: RobotPose, first: RobotPose) -> SceneCamera:
-        if not self._follows:
-            return self._camera
-        return self._camera.moved((pose.position - first.position) * self._free)
 
 
 def _channel_centre(dataset: xr.Dataset) -> float | None:
@@ -295,14 +291,16 @@ def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:
     """Times of the run at the frames, from its start to its end."""
     count = int(np.floor(poses.duration / speed * fps * (1.0 + 1e-12))) + 1
     if count > _MOST_FRAMES:
+        exact = poses.duration * fps / _MOST_FRAMES
+        least = next(step for factor in (1.0, 2.0, 2.5, 5.0) if (step := round_length(exact) * factor) >= exact)
         raise InputError(
             f"speed = {speed:g} makes {count} frames of {poses.duration:.4g} s; allowed: at most {_MOST_FRAMES}, "
-            f"here a speed of {_round_up(poses.duration * fps / _MOST_FRAMES):g} or more"
+            f"here a speed of {least:g} or more"
         )
     if count < 2:
         raise InputError(
             f"speed = {speed:g} makes one frame of {poses.duration:.4g} s; allowed: a speed of "
-            f"{_round_down(poses.duration * fps / 30):g} or less"
+            f"{round_length(poses.duration * fps / 30):g} or less"
         )
     return np.asarray(poses.time[0] + np.arange(count) * (speed / fps), dtype=float)
 
@@ -312,7 +310,7 @@ def _clear_speed(poses: Poses, fps: int) -> float:
     rate = float(np.abs(np.diff(poses.tail_angle) / np.diff(poses.time)).max()) / (2.0 * np.pi)
     if rate <= _LARGEST_TURN * fps:
         return 1.0
-    return max(_round_down(_LARGEST_TURN * fps / rate), _SLOWEST)
+    return max(round_length(_LARGEST_TURN * fps / rate), _SLOWEST)
 
 
 def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[Note, ...]]:
@@ -321,20 +319,8 @@ def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[
     turn = float(np.abs(np.diff(angle)).max()) / (2.0 * np.pi)
     if turn <= _LARGEST_TURN:
         return turn, ()
-    slower = _round_down(speed * _LARGEST_TURN / turn)
+    slower = round_length(speed * _LARGEST_TURN / turn)
     words = (
         f"the tail turns by up to {turn:.2g} turns a frame and may seem to stand or reverse; use a speed of {slower:g}"
     )
     return turn, (Note("aliased-film", words, ("speed",)),)
-
-
-def _round_down(value: float) -> float:
-    """The number of 1, 2 or 5 times a power of ten at or below a value."""
-    from spirillum.view.scene3d.scenery import ruler_steps
-
-    return ruler_steps(value)
-
-
-def _round_up(value: float) -> float:
-    """The number of 1, 2 or 5 times a power of ten at or above a value."""
-    return next(step for step in (_round_down(value) * factor for factor in (1.0, 2.0, 2.5, 5.0)) if step >= value)

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from spirillum.arrays import Samples
-from spirillum.view.figures.scene import FAINT, HALO, INK, length_words
-from spirillum.view.figures.style import UnitPrefix, plain, styled
-from spirillum.view.scene3d.scenery import SceneCamera, ruler_steps
+from spirillum.view.figures.scene import FAINT, INK, label, round_length
+from spirillum.view.figures.style import UnitPrefix, in_words, plain, styled
+from spirillum.view.scene3d.scenery import SceneCamera
 
 _DPI = 200
 _REFERENCE = 900.0  # height of a picture in pixels at which text has its nominal size
@@ -36,12 +36,9 @@ def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Ba
     along = along * np.sign(along @ camera.right)
     normal = camera.sight if camera.parallel else np.cross(along, np.array([0.0, 0.0, 1.0]))
     end = camera.on_plane((0.96 * size[0], size[1] - 0.06 * size[1]), size, middle, normal)
-    unit = float(
-        np.linalg.norm(
-            np.diff(camera.pixels(np.stack([end - 1e-3 * camera.half_height * along, end]), size)[:, :], axis=0)
-        )
-    )
-    length = ruler_steps(0.16 * size[0] / unit * 1e-3 * camera.half_height)
+    short = 1e-3 * camera.half_height
+    unit = float(np.linalg.norm(np.diff(camera.pixels(np.stack([end - short * along, end]), size), axis=0)))
+    length = round_length(0.16 * size[0] / unit * short)
     (start_x, start_y), (end_x, end_y) = camera.pixels(np.stack([end - length * along, end]), size)
     return Bar(length, (float(start_x), float(start_y)), (float(end_x), float(end_y)))
 
@@ -137,10 +134,8 @@ def _draw_bar(axes: Axes, bar: Bar, unit: float, size: tuple[int, int]) -> None:
     tick = 0.009 * size[1]
     for a, b in (bar.start, bar.end):
         axes.plot([a, a], [b - tick, b + tick], color=INK, linewidth=1.0 * unit)
-    middle = (0.5 * (x + u), 0.5 * (y + v) - 0.018 * size[1])
-    axes.text(
-        *middle, length_words(bar.length), ha="center", va="bottom", size=8.5 * unit, color=INK, path_effects=[HALO]
-    )
+    above = 0.5 * (y + v) - 0.018 * size[1]
+    label(axes, 0.5 * (x + u), above, in_words(bar.length, "m"), va="bottom", size=8.5 * unit)
 
 
 def _draw_axes(axes: Axes, camera: SceneCamera, unit: float, size: tuple[int, int]) -> None:
@@ -169,13 +164,4 @@ def _draw_axes(axes: Axes, camera: SceneCamera, unit: float, size: tuple[int, in
             )
         )
         position = origin + way * (1.0 + 0.24 * reach / np.hypot(*way))
-        axes.text(
-            float(position[0]),
-            float(position[1]),
-            f"${name}$",
-            ha="center",
-            va="center",
-            size=8.5 * unit,
-            color=INK,
-            path_effects=[HALO],
-        )
+        label(axes, float(position[0]), float(position[1]), f"${name}$", size=8.5 * unit)

@@ -25,7 +25,7 @@ _SOFTWARE = "vtkOSOpenGLRenderWindow"
 _SOFTWARE_LIBRARIES = ("libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6")
 
 
-def new_plotter(size: tuple[int, int], *, live: bool = False, samples: int = 4) -> Any:
+def new_plotter(size: tuple[int, int], *, live: bool = False) -> Any:
     """An empty PyVista plotter with an OpenGL context, in a window if `live`, else in memory."""
     if live and not _has_display():
         raise InputError(f"--window: DISPLAY is not set; {_INSTEAD}")
@@ -48,7 +48,7 @@ def new_plotter(size: tuple[int, int], *, live: bool = False, samples: int = 4) 
             if live and window.GetClassName() in (_OFF_SCREEN, _SOFTWARE):
                 plotter.close()
                 raise InputError(f"--window: DISPLAY = {os.environ.get('DISPLAY')!r} cannot be opened; {_INSTEAD}")
-            window.SetMultiSamples(samples)
+            window.SetMultiSamples(4)
             if not live:  # nobody looks: the picture is read from where it was drawn
                 window.SetFrameBlitModeToNoBlit()
                 window.SwapBuffersOff()

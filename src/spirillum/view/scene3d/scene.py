@@ -5,6 +5,7 @@ VTK clips scenes of micrometres, so that everything is rendered in units of the 
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +16,9 @@ from spirillum.dynamics.run_file import RobotPose
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
+from spirillum.view.figures.scene import round_length
 from spirillum.view.scene3d.rendering import new_plotter
-from spirillum.view.scene3d.scenery import SceneCamera, View, add_glass, ruler_steps
+from spirillum.view.scene3d.scenery import SceneCamera, View, add_glass
 
 _ALONG, _AROUND = 160, 49
 _HALF_ANGLE = 0.9
@@ -71,10 +73,10 @@ _LAMPS = (  # position about the camera (right, up, towards it), strength
 )
 
 
-def surroundings(rows: int = 64) -> Samples:
-    """(rows, 2 rows, 3) brightness of the surroundings by latitude and longitude: a pale room, a bright lamp above."""
-    up = np.linspace(1.0, -1.0, rows)[:, None, None]
-    around = np.linspace(-np.pi, np.pi, 2 * rows)[None, :, None]
+def surroundings() -> Samples:
+    """(64, 128, 3) brightness of the surroundings by latitude and longitude: a pale room, a bright lamp above."""
+    up = np.linspace(1.0, -1.0, 64)[:, None, None]
+    around = np.linspace(-np.pi, np.pi, 128)[None, :, None]
     room = 0.42 + 0.26 * up + 0.10 * np.cos(around)
     lamp = 1.9 * np.exp(-(((up - 0.72) / 0.16) ** 2)) * (0.75 + 0.25 * np.cos(2.0 * around))
     window = 0.7 * np.exp(-(((up - 0.25) / 0.22) ** 2) - ((np.abs(around) - 1.6) / 0.35) ** 2)
@@ -118,28 +120,6 @@ _BEYOND = 8  # lines beyond what is to be seen, on every side
 _WIDTH = 0.014  # width of a line, in distances of lines
 _ACROSS_GRID: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
 """Axis across the grid, by view; along x there is none, for the robot swims through it."""
-
-
-def add_grid(plotter: Any, pyvista: Any, view: View, low: Samples, high: Samples, step: float) -> None:
-    """Add a grid below the robot, or behind it where it is seen from the side."""
-    if view not in _ACROSS_GRID:
-        return
-    across = _ACROSS_GRID[view]
-    level = high[1] + 0.5 * step if across == 1 else low[2] - 0.5 * step
-    first = np.floor(low / step - _BEYOND).astype(int)
-    last = np.ceil(high / step + _BEYOND).astype(int)
-    in_plane = [axis for axis in range(3) if axis != across]
-    points: list[Samples] = []
-    faces: list[list[int]] = []
-    for axis, other in (in_plane, in_plane[::-1]):
-        for line in range(first[axis], min(last[axis], first[axis] + _MOST_LINES) + 1):
-            corners = np.full((4, 3), level)
-            corners[:, axis] = step * (line + _WIDTH * np.array([-0.5, 0.5, 0.5, -0.5]))
-            corners[:, other] = step * np.array([first[other], first[other], last[other], last[other]])
-            faces.append([4, *range(len(points) * 4, len(points) * 4 + 4)])
-            points.append(corners)
-    mesh = pyvista.PolyData(np.concatenate(points), np.concatenate(faces))
-    plotter.add_mesh(mesh, color=_COLOUR, lighting=False, show_scalar_bar=False)
 
 
 _Material = dict[str, float]
@@ -208,7 +188,7 @@ def resting(solids: DrawnRobot, phase: float = 0.0) -> RobotPose:
     return RobotPose(np.array([0.0, 0.0, height]), np.array([1.0, 0.0, 0.0, 0.0]), phase)
 
 
-class Scene:
+class Scene(AbstractContextManager["Scene"]):
     """Scene for rendering. Lengths in m, the lab's axes: those of the channel, its axis at y = z = 0."""
 
     def __init__(
@@ -218,7 +198,6 @@ class Scene:
         *,
         glass: tuple[float, float] | None = None,
         live: bool = False,
-        samples: int = 4,
         rows: int | None = None,
         quick: bool = False,
     ) -> None:
@@ -226,7 +205,7 @@ class Scene:
         self.solids = solids
         self.unit = solids.length
         self._rows = size[1] if rows is None else min(rows, size[1])
-        self.plotter = new_plotter((size[0], self._rows), live=live, samples=samples)
+        self.plotter = new_plotter((size[0], self._rows), live=live)
         self._pyvista = import_optional("pyvista", "a 3D picture")
         self._size = size
         self._pixels: Any = None
@@ -238,7 +217,7 @@ class Scene:
         add_light(self.plotter, self._pyvista, surrounded=not quick)
         if glass is not None and solids.robot.channel is not None:
             radius = 0.5 * solids.robot.channel.diameter
-            step = ruler_steps(0.11 * solids.length)
+            step = round_length(0.11 * solids.length)
             lengths = (value / self.unit for value in (radius, *glass, step))
             add_glass(self.plotter, self._pyvista, *lengths)
             self._shade = add_shade(self.plotter, self._pyvista, solids.robot, self.unit, level_height(solids))
@@ -262,9 +241,24 @@ class Scene:
         return actor
 
     def add_grid(self, view: View, low: Samples, high: Samples) -> None:
-        """Add a faint grid behind or below the space between two corners, m."""
-        step = ruler_steps(0.3 * self.solids.length)
-        add_grid(self.plotter, self._pyvista, view, low / self.unit, high / self.unit, step / self.unit)
+        """Add a faint grid below the robot, or behind it where it is seen from the side; corners of the space, m."""
+        if view not in _ACROSS_GRID:
+            return
+        across, step = _ACROSS_GRID[view], round_length(0.3 * self.solids.length)
+        level = high[1] / step + 0.5 if across == 1 else low[2] / step - 0.5
+        first = np.floor(low / step - _BEYOND).astype(int)
+        last = np.ceil(high / step + _BEYOND).astype(int)
+        in_plane = [axis for axis in range(3) if axis != across]
+        points: list[Samples] = []
+        for axis, other in (in_plane, in_plane[::-1]):
+            for line in range(first[axis], min(last[axis], first[axis] + _MOST_LINES) + 1):
+                corners = np.full((4, 3), level)
+                corners[:, axis] = line + _WIDTH * np.array([-0.5, 0.5, 0.5, -0.5])
+                corners[:, other] = [first[other], first[other], last[other], last[other]]
+                points.append(corners)
+        faces = np.insert(np.arange(4 * len(points)).reshape(-1, 4), 0, 4, axis=1)
+        mesh = self._pyvista.PolyData(np.concatenate(points) * (step / self.unit), faces)
+        self.plotter.add_mesh(mesh, color=_COLOUR, lighting=False, show_scalar_bar=False)
 
     def place(self, pose: RobotPose) -> None:
         """Move the robot: rigid motions of its two parts."""
@@ -307,12 +301,5 @@ class Scene:
         image[above : above + self._rows] = drawn
         return image
 
-    def close(self) -> None:
-        """Give back the window's memory."""
-        self.plotter.close()
-
-    def __enter__(self) -> Scene:
-        return self
-
     def __exit__(self, *_: object) -> None:
-        self.close()
+        self.plotter.close()  # which gives back the window's memory

@@ -131,12 +131,6 @@ _CEILING, _FLOOR, _BAND, _NEAR = "#cdd6dc", "#e3eef4", "#eaf1f5", "#f4fafd"
 _RIM, _EDGE, _TICK = "#9dbfd1", "#5f8ba3", "#54788e"
 
 
-def ruler_steps(about: float) -> float:
-    """A length of 1, 2 or 5 times a power of ten, at most `about`."""
-    power = 10.0 ** np.floor(np.log10(about))
-    return float(next(m * power for m in (5.0, 2.0, 1.0) if m * power <= about * 1.0001))
-
-
 def _tube(pyvista: Any, radius: float, start: float, end: float, colours: Samples) -> Any:
     """An open cylinder about the x axis with a colour (with or without alpha, 0 to 1) at each of its sides."""
     ring = np.stack([np.zeros(_SIDES), np.cos(_AROUND), np.sin(_AROUND)], axis=-1)

@@ -19,6 +19,8 @@ from spirillum.files import MARK, atomic_write, output_target
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
+from spirillum.view.figures.scene import tail_words
+from spirillum.view.figures.style import in_words
 from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
 
 if TYPE_CHECKING:
@@ -105,6 +107,8 @@ def show(
     turned = parse_option("phase", phase, KINDS["angle"])
     pixels = checked_size(size)
     loaded = load(robot)
+    from PIL import Image
+
     from spirillum.view.scene3d.overlay import blended_into, scale_bar, words_on
     from spirillum.view.scene3d.scene import DrawnRobot, Scene, resting
 
@@ -121,7 +125,7 @@ def show(
     with Scene(solids, (finer * pixels[0], finer * pixels[1]), glass=glass) as scene:
         scene.place(pose)
         scene.look(camera)
-        image = _averaged(scene.image(), finer)
+        image = np.array(Image.fromarray(scene.image()).reduce(finer))
     bar = scale_bar(camera, pixels, pose.position)
     image = blended_into(words_on(pixels, camera, bar, loaded.name, _lines(loaded, camera, glass)))(image)
     if target is not None:
@@ -159,41 +163,20 @@ def shown_points(solids: DrawnRobot, pose: RobotPose, glass: tuple[float, float]
     return np.concatenate([corners, *(ring + np.array([end, 0.0, 0.0]) for end in glass)])
 
 
-def _averaged(image: np.ndarray, finer: int) -> np.ndarray:
-    """One pixel from each square of finer ones."""
-    height, width = image.shape[0] // finer, image.shape[1] // finer
-    squares = image.reshape(height, finer, width, finer, 3).astype(np.uint16)
-    return np.asarray((squares.sum(axis=(1, 3)) + finer * finer // 2) // (finer * finer), dtype=np.uint8)
-
-
 def _lines(robot: Robot, camera: SceneCamera, glass: tuple[float, float] | None) -> list[str]:
-    from spirillum.view.figures.scene import length_words
-
     lines = ["computed geometry" + (", to scale" if camera.parallel else "")]
     if glass is not None and robot.channel is not None:
-        lines.append(f"a piece of its channel of {length_words(robot.channel.diameter)} inner diameter")
+        lines.append(f"a piece of its channel of {in_words(robot.channel.diameter, 'm')} inner diameter")
     return lines
-
-
-def _words(robot: Robot, view: View) -> str:
-    """Alternative text of the picture."""
-    from spirillum.view.figures.scene import length_words
-
-    body, tail = robot.body, robot.tail
-    return (
-        f"{robot.name}, {view} view: a {body.shape} body of {length_words(body.diameter)} diameter and "
-        f"{length_words(body.length)} length, a {tail.handedness}-handed helical tail of {length_words(tail.length)} "
-        f"length, {length_words(tail.wavelength)} wavelength and {length_words(tail.amplitude)} amplitude behind it. "
-        "Computed geometry, not a photograph."
-    )
 
 
 def _write_png(image: np.ndarray, path: Path, robot: Robot, view: View) -> None:
     from PIL import Image, PngImagePlugin
 
+    words = f"{robot.name}, {view} view: a {tail_words(robot)}. Computed geometry, not a photograph."
     facts = PngImagePlugin.PngInfo()
     facts.add_itxt("Title", robot.name)
     facts.add_text("Software", MARK)
-    facts.add_itxt("Description", _words(robot, view))
+    facts.add_itxt("Description", words)  # alternative text
     with atomic_write(path) as temporary:
         Image.fromarray(image).save(temporary, format="png", optimize=True, pnginfo=facts)
