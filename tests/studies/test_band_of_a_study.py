@@ -100,7 +100,7 @@ def test_interrupted_band_resumes_where_it_stopped(
     def counted(task: Any, loaded: Any, observed: Any) -> Any:
         if len(done) == 3:
             raise KeyboardInterrupt
-        done.append(task.number)
+        done.append(task.pose)
         return original(task, loaded, observed)
 
     monkeypatch.setattr(BandTask, "answer", counted)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.studies.work import ModelTask
+from spirillum.studies.run import keep
 
 
 @pytest.fixture(autouse=True)
@@ -22,16 +22,15 @@ def test_interrupted_study_resumes_where_it_stopped(
 ) -> None:
     whole = sp.study(small)
     done: list[int] = []
-    original = ModelTask.answer
     most = 3
 
-    def counted(task, loaded, observed):
+    def counted(number, part, folder):
         if len(done) == most:
             raise KeyboardInterrupt
-        done.append(task.number)
-        return original(task, loaded, observed)
+        done.append(number)
+        keep(number, part, folder)
 
-    monkeypatch.setattr(ModelTask, "answer", counted)
+    monkeypatch.setattr("spirillum.studies.run.keep", counted)
     with pytest.raises(KeyboardInterrupt):
         sp.study(small, output=tmp_path / "out")
     assert not (tmp_path / "out" / "dataset.nc").exists()

@@ -16,7 +16,6 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.outliers import outlying_trials
 from spirillum.errors import InputError
 from spirillum.files import read_bytes
 from spirillum.files.limits import LARGEST_TABLE
@@ -34,6 +33,7 @@ from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.swimming.drawn_resistance import error_of_mean
 
 Quantity = Literal["advance", "turning", "motor_rate"]  #: U/omega (or U/omega_m), Omega/omega, omega_m.
@@ -195,7 +195,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
             *convention_doubt(all_rates(observations)),
             *(sentence for group in items for sentence in _copies(group)),
         ),
-        outliers=outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
+        outliers=_outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
 
 
@@ -382,6 +382,43 @@ def _ratio(found: Sequence[_Trials]) -> Ratio:
         freedom=np.array([item.freedom for item in found]),
         stated=np.array([item.stated for item in found]) * size / scale,
     )
+
+
+_FAR_OFF = 8.0  # robust standard deviations, pooled over all trials, beyond which a trial is an outlier
+_LEAST_OFF = 0.15  # relative deviation below which no trial is an outlier
+_FEWEST_TRIALS = 3
+_CHECKED_COLUMNS = ("forward_velocity_mm_s", "body_rate_Hz")
+
+
+def _outlying_trials(
+    groups: Sequence[Sequence[ObservationRow]], ratios: Sequence[tuple[Samples, Samples]]
+) -> tuple[Note, ...]:
+    """A sentence for each row whose advance or turning is an outlier among the trials of its tail."""
+    found: list[Note] = []
+    for number, column in enumerate(_CHECKED_COLUMNS):
+        deviations = [_deviations(own[number]) for own in ratios]
+        known = np.concatenate([own[np.isfinite(own)] for own in deviations]) if deviations else np.empty(0)
+        if known.size == 0:
+            continue
+        scale = float(mad_scale(known))
+        for group, own in zip(groups, deviations, strict=True):
+            for item, off in zip(group, own.tolist(), strict=False):
+                if np.isfinite(off) and abs(off) > max(_FAR_OFF * scale, _LEAST_OFF):
+                    words = (
+                        f"row {item.row}, column {column}: {1.0 + off:.3g} times the median of its tail's trials, each "
+                        "over its own rate; check the number"
+                    )
+                    found.append(Note("outlier", words, (column,)))
+    return tuple(found)
+
+
+def _deviations(values: Samples) -> Samples:
+    """Relative deviation of each trial from the median; NaN where there are too few."""
+    known = values[np.isfinite(values)]
+    if known.size < _FEWEST_TRIALS or np.median(known) == 0:
+        return np.full(values.shape, np.nan)
+    found: Samples = values / np.median(known) - 1.0
+    return found
 
 
 _FEWEST_PAIRS = 10

@@ -103,10 +103,11 @@ class VirtualExperiment(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The experiment's facts, as ``virtual-experiment --json`` prints them."""
-        robots = [
-            {"robot": name, **_answered_by(*self.models.get(name, ("", ""))), **rate_quantities(self.rates[name])}
-            for name in self.robots
-        ]
+        robots = []
+        for name in self.robots:
+            known = zip(("model", "model_reason"), self.models.get(name, ("", "")), strict=True)
+            answered = {key: text for key, text in known if text}  # without a reason where the model was named
+            robots.append({"robot": name, **answered, **rate_quantities(self.rates[name])})
         content = {
             "synthetic": True,
             "folder": str(self.folder),
@@ -214,11 +215,6 @@ def virtual_experiment(
     )
 
 
-def _answered_by(source: str, reason: str) -> dict[str, str]:
-    """Source of a robot's rates, with the reason for its model where one was chosen."""
-    return ({"model": source} if source else {}) | ({"model_reason": reason} if reason else {})
-
-
 class _Filmed(NamedTuple):
     """Content of an experiment: robots and trials."""
 
@@ -295,17 +291,12 @@ def _finished(folder: Path, planned: Planned) -> bool:
     known = ["setup.toml"] if is_preset(planned.robot) else ["setup.toml", "robot.toml"]
     try:
         read_json(trial.with_name(f"{trial.name}.truth.json"), "the truth of a trial")
-        begins = _first_bytes(trial.with_name(f"{trial.name}.truth.nc"))
+        with opened(trial.with_name(f"{trial.name}.truth.nc"), "a file of a trial", sys.maxsize) as file:
+            begins = file.read(8)
         whole = _is_whole_film(trial.with_name(f"{trial.name}.mp4")) and begins == b"\x89HDF\r\n\x1a\n"
         return whole and all((trial.parent / name).stat().st_size > 0 for name in known)
     except (OSError, ValueError):
         return False
-
-
-def _files_of(folder: Path, planned: Planned) -> list[Path]:
-    trial = folder / planned.label
-    beside = [trial.with_name(f"{trial.name}.{end}") for end in ("mp4", "truth.json", "truth.nc")]
-    return [*beside, trial.parent / "setup.toml", trial.parent / "robot.toml"]
 
 
 def _is_whole_film(path: Path) -> bool:
@@ -325,12 +316,6 @@ def _is_whole_film(path: Path) -> bool:
     return offset == size and {b"ftyp", b"moov", b"mdat"} <= kinds
 
 
-def _first_bytes(path: Path) -> bytes:
-    """The first eight bytes, which identify the kind of file."""
-    with opened(path, "a file of a trial", sys.maxsize) as file:
-        return file.read(8)
-
-
 class _Stopped(Exception):  # noqa: N818
     """Rendering was interrupted."""
 
@@ -346,7 +331,9 @@ def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> 
             if stop.is_set():
                 raise _Stopped
 
-        for damaged in _files_of(folder, planned):
+        trial = folder / planned.label
+        beside = [trial.with_name(f"{trial.name}.{end}") for end in ("mp4", "truth.json", "truth.nc")]
+        for damaged in (*beside, trial.parent / "setup.toml", trial.parent / "robot.toml"):
             if damaged.is_file() and not written_by_us(damaged):  # the folder is claimed: it was ours
                 damaged.unlink()
         render(

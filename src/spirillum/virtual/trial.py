@@ -84,8 +84,8 @@ def video_writer(
 ) -> Iterator[FrameWriter]:
     """A writer of a video; it appears, complete, when the block ends."""
     if target.suffix.lower() != ".mp4":
-        with _png_writer(target, tags) as pngs:
-            yield pngs
+        with atomic_folder(target) as part:
+            yield _Pngs(part, tags)
         return
     with (
         atomic_write(target) as temporary,
@@ -119,12 +119,6 @@ class _Pngs:
         for name, text in self._tags.items():
             info.add_itxt(name.capitalize(), text)
         Image.fromarray(image).save(self._folder / f"{number:05d}.png", compress_level=1, pnginfo=info)
-
-
-@contextmanager
-def _png_writer(folder: Path, tags: Mapping[str, str]) -> Iterator[FrameWriter]:
-    with atomic_folder(folder) as part:
-        yield _Pngs(part, tags)
 
 
 _MOST_FRAMES = 200_000

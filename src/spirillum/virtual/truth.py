@@ -13,6 +13,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.files import MARK
+from spirillum.formats.templates import rendered
+from spirillum.quantities import unit_of
 from spirillum.virtual.optics import VirtualLens
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
@@ -21,16 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SYNTHETIC = "synthetic: a computed robot seen by a virtual camera, not a measurement"
-_UNITS = {
-    "forward_velocity": "m/s",
-    "body_rotation_rate": "rad/s",
-    "tail_rotation_rate": "rad/s",
-    "motor_rotation_rate": "rad/s",
-}
-
-
-def _mm(value: float) -> str:
-    return f'"{1e3 * value:.9g} mm"'
 
 
 def setup_text(
@@ -44,35 +36,24 @@ def setup_text(
     glass: bool = False,
 ) -> str:
     """A setup file."""
-    height, uncertainty = axis
-    lines = [
-        f"# {SYNTHETIC}; {MARK}",
-        "[camera]",
-        f'view = "{camera.view}"',
-        f"height = {_mm(lens.eye)}",
-        *([] if timed else [f"frames_per_second = {camera.fps!r}"]),
-        "",
-        "[tank]",
-        f"surface = {_mm(lens.surface)}",
-        f"index = {lens.index!r}",
-        "",
-        "[markers]",
-        f"spacing = {_mm(spacing)}",
-        'height = "0 mm"',
-        "",
-        "[robot]",
-        f"file = {json.dumps(robot_file, ensure_ascii=False)}",  # a string of JSON is one of TOML
-        f"axis_height = {_mm(height)}",
-        *([f"axis_height_uncertainty = {_mm(uncertainty)}"] if uncertainty > 0 else []),
-        f'direction = "{camera.direction}"',
-        f'appearance = "{"glass" if glass else "opaque"}"',
-    ]
-    return "\n".join(lines) + "\n"
+    return rendered(
+        "virtual/setup.toml.jinja",
+        filters={"mm": lambda value: f'"{1e3 * value:.9g} mm"'},
+        synthetic=SYNTHETIC,
+        mark=MARK,
+        robot_file=json.dumps(robot_file, ensure_ascii=False),  # a string of JSON is one of TOML
+        camera=camera,
+        lens=lens,
+        spacing=spacing,
+        axis=axis,
+        timed=timed,
+        glass=glass,
+    )
 
 
 def rate_quantities(rates: Mapping[str, float]) -> dict[str, Any]:
     """Forward velocity and rates as quantities of a result."""
-    return {name: quantity(value, _UNITS[name]) for name, value in rates.items()}
+    return {name: quantity(value, unit_of(name)) for name, value in rates.items()}
 
 
 def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:

@@ -22,6 +22,7 @@ from spirillum.papers.biorob2012.evidence import (
     Evidence,
     FrictionModelRuns,
     Judgement,
+    claim_of,
 )
 from spirillum.papers.biorob2012.published import VELOCITY_DROPS
 from spirillum.papers.claim import Claim, PredictedVerdict, Verdict
@@ -36,9 +37,8 @@ if TYPE_CHECKING:
 
 def calibration_factors(evidence: Evidence) -> Iterator[Claim]:
     """Table III."""
-    yield Claim(
-        "Body drag factors that represent the walls (Table III)",
-        "1.95 D_x wide, 3.6 D_x narrow; 0.6 E_x (SBT), 1 E_x (RFT)",
+    yield claim_of(
+        "drag_factors",
         "used as given, as named calibrations of the preset robots",
         "undecidable",
         "they come from inverting (15) with the paper's observations, which are lost"
@@ -51,35 +51,24 @@ def robot_and_channel(evidence: Evidence) -> Iterator[Claim]:
     robot, narrow = evidence.robot, load("biorob2012-narrow")
     derived = robot.derived()
     length = derived["robot_length"].value
-    yield Claim(
-        "The prototype is more than 10 centimetres long",
-        f"> {1e3 * ROBOT_LENGTH:.0f} mm",
-        f"{1e3 * length:.0f} mm (body, coupling and tail)",
-        _verdict(length > ROBOT_LENGTH),
-        "sum of Table I's lengths",
-    )
+    found = f"{1e3 * length:.0f} mm (body, coupling and tail)"
+    reason = "sum of Table I's lengths"
+    yield claim_of("length", found, _verdict(length > ROBOT_LENGTH), reason, length=1e3 * ROBOT_LENGTH)
     weight = derived["submerged_weight"].value
-    yield Claim(
-        "The robot's weight is bigger than the buoyancy acting on it",
-        "weight > buoyancy",
+    yield claim_of(
+        "weight",
         f"submerged weight {1e3 * weight:.1f} mN",
         _verdict(weight > 0),
         "Table I's mass and volumes, copper wire; the clearance of the coupling is assumed",
     )
     if robot.channel is not None and narrow.channel is not None:
         reduction = 1.0 - narrow.channel.diameter / robot.channel.diameter
-        yield Claim(
-            "The narrow channel's radius is 25 % smaller",
-            f"{100 * NARROWER:.0f} %",
-            f"{100 * reduction:.0f} %",
-            _verdict(bool(np.isclose(reduction, NARROWER))),
-            "Table I",
-        )
+        holds = _verdict(bool(np.isclose(reduction, NARROWER)))
+        yield claim_of("narrower", f"{100 * reduction:.0f} %", holds, "Table I", narrower=100 * NARROWER)
     if robot.motor is not None:
         friction = robot.motor.rotor_friction
-        yield Claim(
-            "Pure rotor friction is of the order of 1e-7 N m s/rad",
-            "order 1e-7 (text), 7e-7 (Table II)",
+        yield claim_of(
+            "rotor_friction",
             f"{friction:.0e} N m s/rad, Table II's value",
             "undecidable",
             "a measurement of the paper; 7e-7 is closer to 1e-6 than to 1e-7",
@@ -91,31 +80,29 @@ def method(evidence: Evidence) -> Iterator[Claim]:
     fastest = max(
         float(np.nanmax(np.abs(evidence.free("tail_rotation_rate", model)))) / Hz for model in evidence.models
     )
-    yield Claim(
-        "The camera's sampling rate resolves the rotation (Nyquist)",
-        f"{FRAME_RATE:.0f} frames/s",
+    yield claim_of(
+        "sampling",
         f"fastest tail at the friction-free bound {fastest:.1f} Hz; Nyquist limit {0.5 * FRAME_RATE:.0f} Hz",
         _verdict(fastest < 0.5 * FRAME_RATE),
         "an upper bound of the tail's rate lies below half the frame rate",
+        rate=FRAME_RATE,
     )
     difference = PRINTED_EPS_CONSTANT / EXACT_EPS_CONSTANT - 1.0
-    yield Claim(
-        "Constant of eps in the slender-body theory",
-        f"{PRINTED_EPS_CONSTANT:g}",
+    yield claim_of(
+        "eps",
         f"pi sqrt(e)/2 = {EXACT_EPS_CONSTANT:.5f}, {100 * difference:.1f} % less",
         _verdict(abs(difference) < 0.01),
         "rounded from Lighthill's cut-off; the printed value is the default, the exact one an option",
+        eps=PRINTED_EPS_CONSTANT,
     )
-    yield Claim(
-        "One simulation of the time-dependent model takes two to three seconds",
-        "2 to 3 s",
+    yield claim_of(
+        "simulation_time",
         "not timed here; the benchmarks give ratios within one run",
         "undecidable",
         "it depends on the machine",
     )
-    yield Claim(
-        "Averages of five measurements with 95 % confidence intervals",
-        "n = 5",
+    yield claim_of(
+        "averages",
         "Student t over the trials of the observations file" if evidence.observed else "no observations given",
         "undecidable",
         "a procedure, not a result" if evidence.observed else NO_RATES,
@@ -170,12 +157,16 @@ def _reynolds_numbers(readings: FrictionModelRuns) -> Iterator[Claim]:
             continue
         seen, wanted = speeds[number][tail], readings.evidence.speed_of(stated.value)
         found = readings.compare(seen, wanted, "mm/s", 1e3)
-        yield readings.claim(
-            f"Largest Reynolds number, {channel} channel, at lambda = {stated.wavelength_mm:g} mm, "
-            f"B_o = {stated.amplitude_mm:g} mm",
-            f"{stated.value:g} (length scale not stated): {1e3 * wanted:.2f} mm/s on the body's diameter",
+        yield claim_of(
+            "largest_reynolds",
             _range(seen, " mm/s", 1e3),
-            found._replace(reason=f"{found.reason}; a longer length in Re means a lower speed"),
+            found.verdict,
+            f"{found.reason}; a longer length in Re means a lower speed",
+            channel=channel,
+            wavelength=stated.wavelength_mm,
+            amplitude=stated.amplitude_mm,
+            reynolds=stated.value,
+            scale=f" (length scale not stated): {1e3 * wanted:.2f} mm/s on the body's diameter",
         )
 
 
@@ -186,12 +177,9 @@ def _velocity_drops(readings: FrictionModelRuns) -> Iterator[Claim]:
         if tail is None:
             continue
         drops = speeds[0][tail] - speeds[1][tail]
-        yield readings.claim(
-            f"The {which} velocity decrease, wide to narrow, at lambda = {wavelength:g} mm, B_o = {amplitude:g} mm",
-            f"{drop:g} mm/s",
-            _range(drops, " mm/s", 1e3),
-            readings.compare(drops, 1e-3 * drop, "mm/s", 1e3),
-        )
+        found = readings.compare(drops, 1e-3 * drop, "mm/s", 1e3)
+        numbers: dict[str, Any] = {"wavelength": wavelength, "amplitude": amplitude, "drop": drop}
+        yield claim_of("decrease", _range(drops, " mm/s", 1e3), *found, which=which, **numbers)
 
 
 def _global_drop(readings: FrictionModelRuns) -> Iterator[Claim]:
@@ -202,28 +190,20 @@ def _global_drop(readings: FrictionModelRuns) -> Iterator[Claim]:
     found = readings.compare(loss, GLOBAL_DROP, "%", 100.0)
     if readings.missing:
         found = Judgement("depends", f"no table: {readings.missing}, and it speaks of the mean of all")
-    yield readings.claim(
-        "Decrease of the global average velocity of all body-tail assemblies, wide to narrow",
-        f"{100 * GLOBAL_DROP:.1f} %",
-        f"{_range(loss, ' %', 100.0)} over {len(wide)} of {readings.both.size} tails",
-        found,
-    )
-    yield readings.claim(
-        "Robots travel slower in the narrow channel",
-        "all tails",
+    computed = f"{_range(loss, ' %', 100.0)} over {len(wide)} of {readings.both.size} tails"
+    yield claim_of("global_drop", computed, *found, by="", drop=100 * GLOBAL_DROP)
+    yield claim_of(
+        "slower",
         f"the narrow channel takes {_range(1.0 - narrow / wide, ' %', 100.0)} of the speed",
-        readings.verdict_on(readings.holds(wide - narrow)),
+        *readings.verdict_on(readings.holds(wide - narrow)),
     )
 
 
 def _speeds(readings: FrictionModelRuns) -> Iterator[Claim]:
     speeds = readings.of("forward_velocity")
     rising, falling = np.diff(speeds, axis=1), -np.diff(speeds[:, :-1], axis=2)
-    for statement, steps in (
-        ("Forward velocity increases with wavelength", rising),
-        ("Forward velocity decreases with amplitude, except at lambda = 25 mm", falling),
-    ):
-        yield readings.claim(statement, "trend", _steps(steps), readings.verdict_on(readings.holds(steps)))
+    for key, steps in (("speed_wavelength", rising), ("speed_amplitude", falling)):
+        yield claim_of(key, _steps(steps), *readings.verdict_on(readings.holds(steps)))
 
 
 def _steps(steps: Values) -> str:
@@ -236,41 +216,35 @@ def _steps(steps: Values) -> str:
 def _body_rotation(readings: FrictionModelRuns) -> Iterator[Claim]:
     rates = np.abs(readings.of("body_rotation_rate"))
     inside = np.minimum(rates - 10**-2.5 * Hz, 10**-0.5 * Hz - rates)
-    yield readings.claim(
-        "Body rotation rates are of the order of 1e-2 to 1e-1",
-        "1e-2 to 1e-1 (unit not stated)",
+    yield claim_of(
+        "body_rates",
         _range(rates, " Hz", 1.0 / Hz),
-        readings.verdict_on(readings.holds(inside)),
+        *readings.verdict_on(readings.holds(inside)),
     )
     errors = {
         name: np.abs(readings.of("modelled_body_rotation_rate", name) / readings.of("body_rotation_rate") - 1.0)
         for name in INFERRED_BY
     }
     within = np.minimum(*(BODY_ROTATION_ERROR - error for error in errors.values()))
-    yield readings.claim(
-        "SBT and RFT predict body rotation rates within 1 to 50 %, RFT with the large errors",
-        "1 to 50 %",
+    yield claim_of(
+        "body_rate_errors",
         ", ".join(f"{label(name)} misses by {_range(error, ' %', 100.0)}" for name, error in errors.items()),
-        readings.verdict_on(readings.holds(within)),
+        *readings.verdict_on(readings.holds(within)),
     )
 
 
 def _motor_rates(readings: FrictionModelRuns) -> Iterator[Claim]:
     rates = np.abs(readings.of("motor_rotation_rate"))
     apart = np.abs(rates[1] / rates[0] - 1.0)
-    yield readings.claim(
-        "Motor rates are identical in wide and narrow channel",
-        "identical",
+    yield claim_of(
+        "motor_equal",
         f"{_range(rates, ' Hz', 1.0 / Hz)}; they differ by {_range(apart, ' %', 100.0)}",
-        readings.verdict_on(readings.holds(_EQUAL - apart)),
+        *readings.verdict_on(readings.holds(_EQUAL - apart)),
     )
     rising = np.diff(rates, axis=1)
-    for statement, steps in (
-        ("The motor's rate decreases with amplitude", -np.diff(rates, axis=2)),
-        ("The motor's rate increases with wavelength", rising),
-        ("The motor's rate saturates as the wavelength increases", -np.diff(rising, axis=1)),
-    ):
-        yield readings.claim(statement, "trend", _steps(steps), readings.verdict_on(readings.holds(steps)))
+    falling, saturating = -np.diff(rates, axis=2), -np.diff(rising, axis=1)
+    for name, steps in (("amplitude", falling), ("wavelength", rising), ("saturates", saturating)):
+        yield claim_of(f"motor_{name}", _steps(steps), *readings.verdict_on(readings.holds(steps)))
 
 
 def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
@@ -286,16 +260,14 @@ def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
         judgement = readings.verdict_on(readings.holds((by_amplitude - by_wavelength)[None]))
     else:
         computed, judgement = "not computed", Judgement("depends", f"no table: {readings.missing}")
-    statement = "B_eff depends mostly on the amplitude instead of the wavelength"
-    yield readings.claim(statement, "trend", computed, judgement)
+    yield claim_of("friction_amplitude", computed, *judgement)
     if motor is None:
         return
     rotor = motor.joint_rotor_friction
-    yield readings.claim(
-        "Friction is not the rotor's alone",
-        "B_eff well above B_m",
+    yield claim_of(
+        "friction_beyond_rotor",
         f"B_eff {_range(found, ' N m s/rad')} by (18), {_range(found / rotor, ' times B_m')}",
-        readings.verdict_on(readings.holds(found - 3.0 * rotor)),
+        *readings.verdict_on(readings.holds(found - 3.0 * rotor)),
     )
     with np.errstate(invalid="ignore"):
         spread = np.fmax.reduce(found, axis=-1) / np.fmin.reduce(found, axis=-1) - 1.0
@@ -305,15 +277,12 @@ def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
         verdict: PredictedVerdict = "depends"
         if moves.all() or not moves.any():
             verdict = "predicted-agrees" if moves.all() else "predicted-disagrees"
-        yield readings.claim(
-            "B_eff is dominated by the body-channel interaction",
-            "dominated",
+        yield claim_of(
+            "friction_interaction",
             f"over all gaps, films and contacts of a robot its B_eff changes by {_range(spread, ' %', 100.0)}",
-            Judgement(
-                verdict,
-                "(18) balances the rotor, film and contact act on the body: B_eff is the load of coupling and tail in "
-                "the tube that RFT's tail in unbounded fluid does not have",
-            ),
+            verdict,
+            "(18) balances the rotor, film and contact act on the body: B_eff is the load of coupling and tail in "
+            "the tube that RFT's tail in unbounded fluid does not have",
         )
 
 
@@ -321,32 +290,27 @@ def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
     seen = readings.of("forward_velocity")
     missed = {name: (readings.of("modelled_forward_velocity", name) - seen)[readings.known] for name in INFERRED_BY}
     errors: dict[str, Values] = {name: np.sqrt(_of_tails(np.ma.mean, miss**2)) for name, miss in missed.items()}
-    yield readings.claim(
-        "SBT predicts forward velocities better than RFT",
-        "SBT in better agreement",
+    yield claim_of(
+        "sbt_better",
         ", ".join(f"{label(name)} {_range(error, ' mm/s', 1e3)}" for name, error in errors.items())
         + " root mean square",
-        readings.verdict_on(readings.holds((errors["rft"] - errors["sbt"])[None])),
+        *readings.verdict_on(readings.holds((errors["rft"] - errors["sbt"])[None])),
     )
     factors = readings.of("body_drag_factor", "sbt")
     for number, (channel, stated) in enumerate(BODY_DRAG_FACTORS.items()):
         of_tails = factors[number][readings.known[number]]
         if of_tails.size:
-            yield readings.claim(
-                f"Body drag factor that represents the walls of the {channel} channel (Table III)",
-                f"{stated:g} D_x",
-                f"{_range(of_tails, '')} by inverting (15) with SBT's tail at the speeds and rates of the readings",
-                readings.compare(_of_tails(np.ma.median, of_tails), stated, "", 1.0),
-            )
+            found = f"{_range(of_tails, '')} by inverting (15) with SBT's tail at the speeds and rates of the readings"
+            judgement = readings.compare(_of_tails(np.ma.median, of_tails), stated, "", 1.0)
+            yield claim_of("wall_factor", found, *judgement, channel=channel, factor=stated)
 
 
 def _contact(readings: FrictionModelRuns) -> Iterator[Claim]:
     share = readings.of("contact_share")
-    yield readings.claim(
-        "The robot is in intermittent contact with the channel's surface",
-        "intermittent",
+    yield claim_of(
+        "contact",
         f"asperities touch for {_range(share, ' %', 100.0)} of the time",
-        readings.verdict_on(readings.holds(np.minimum(share, 1.0 - share))),
+        *readings.verdict_on(readings.holds(np.minimum(share, 1.0 - share))),
     )
 
 

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Flags, Values
+from spirillum.data_tables import rows_of
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.papers.claim import Claim, PredictedVerdict
+from spirillum.papers.claim import Claim, PredictedVerdict, Verdict
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.studies.columns import reference_pose
@@ -63,6 +64,18 @@ FRAME_RATE = 30.0  #: Frame rate of the camera, Hz; text on the experiments.
 
 
 NO_RATES = "the observed rates are lost; give an observations file to decide"
+
+
+STATEMENTS = {row["key"]: row for row in rows_of("papers/biorob2012/statements.csv")}
+"""The paper's statements, each with what it states, by their keys."""
+
+
+def claim_of(
+    key: str, computed: str, verdict: Verdict | PredictedVerdict, reason: str, **numbers: float | str
+) -> Claim:
+    """A statement with its verdict; `numbers` fill its places."""
+    row = STATEMENTS[key]
+    return Claim(row["statement"].format(**numbers), row["paper"].format(**numbers), computed, verdict, reason)
 
 
 class Evidence:
@@ -203,11 +216,11 @@ class FrictionModelRuns:
         found: Values = np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)
         return found
 
-    def verdict_on(self, holds: Values, *, of_all: bool = True) -> Judgement:
-        """The verdict on a statement, 1, 0 or NaN in each reading; one `of_all` stays open without a table."""
+    def verdict_on(self, holds: Values) -> Judgement:
+        """The verdict on a statement about all robots, 1, 0 or NaN in each reading; it stays open without a table."""
         known = np.isfinite(holds)
         count, total = int(np.nansum(holds)), int(known.sum())
-        lacking = f"; {self.missing}" if of_all and self.missing else ""
+        lacking = f"; {self.missing}" if self.missing else ""
         if total == 0:
             return Judgement("depends", self._nothing)
         if count == 0:
@@ -240,10 +253,6 @@ class FrictionModelRuns:
         names = self._movers(values)
         means = "; ".join(self._means(values, name, unit, scale) for name in names)
         return Judgement("depends", f"{_joined(names)}: the readings are on both sides, on average {means}")
-
-    def claim(self, statement: str, paper: str, computed: str, judgement: Judgement) -> Claim:
-        """A statement with its verdict."""
-        return Claim(statement, paper, computed, judgement.verdict, judgement.reason)
 
     @property
     def _nothing(self) -> str:
