@@ -1,8 +1,12 @@
-"""Tables of text that stand beside their modules: notes, quantities, units, options."""
+"""Texts that are data: tables beside their modules (notes, quantities, units, options), and meanings of fields."""
 
 from __future__ import annotations
 
+import ast
 import csv
+from collections.abc import Sequence
+from inspect import cleandoc
+from itertools import pairwise
 from pathlib import Path
 
 
@@ -10,3 +14,14 @@ def rows_of(table: str) -> list[dict[str, str]]:
     """Rows of a CSV file of this package, `folder/file.csv`, by the names in its head."""
     text = (Path(__file__).parent / table).read_text(encoding="utf-8")
     return list(csv.DictReader(text.splitlines()))
+
+
+def field_texts(definition: ast.ClassDef, lines: Sequence[str]) -> dict[str, str]:
+    """Meanings of the fields of a class: what follows `#:` on the line of each, else the text below it."""
+    found = {}
+    for field, below in pairwise([*definition.body, ast.Pass()]):
+        if isinstance(field, ast.AnnAssign):
+            own = lines[(field.end_lineno or field.lineno) - 1].partition("  #: ")[2]
+            text = below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else ""
+            found[ast.unparse(field.target)] = own or cleandoc(str(text))
+    return found

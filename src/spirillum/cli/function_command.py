@@ -36,6 +36,7 @@ from spirillum.cli.shared_options import (
     Settings,
     choices,
 )
+from spirillum.data_tables import field_texts
 from spirillum.errors import InputError
 
 _SOURCE = Path(__file__).parents[2]
@@ -386,15 +387,14 @@ def _declared(module: str, name: str) -> Iterator[Declaration]:
 
 
 def _class_fields(module: str, table: str) -> Iterator[Declaration]:
-    """Fields of an options table or dataclass with the docstrings under them."""
+    """Fields of an options table or dataclass with their meanings."""
     home = _home(module, table)
     found = _found(home, table, ast.ClassDef)
-    for item, behind in zip(found.body, found.body[1:], strict=False):
-        if not isinstance(item, ast.AnnAssign) or "ClassVar" in ast.unparse(item.annotation):
-            continue
-        text = behind.value.value if isinstance(behind, ast.Expr) and isinstance(behind.value, ast.Constant) else ""
-        name, annotation = ast.unparse(item.target), ast.unparse(item.annotation)
-        yield Declaration(name, annotation, _value(home, item.value), " ".join(str(text).split()))
+    texts = field_texts(found, _source(home).splitlines())
+    for item in found.body:
+        if isinstance(item, ast.AnnAssign) and "ClassVar" not in (annotation := ast.unparse(item.annotation)):
+            name = ast.unparse(item.target)
+            yield Declaration(name, annotation, _value(home, item.value), " ".join(texts[name].split()))
 
 
 def _is_table(module: str, name: str) -> bool:
@@ -411,10 +411,14 @@ def _arguments_said(docstring: str) -> dict[str, str]:
 
 
 @cache
-def _tree(module: str) -> ast.Module:
+def _source(module: str) -> str:
     path = _SOURCE / module.replace(".", "/")
-    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return ast.parse(source.read_text(encoding="utf-8"))
+    return (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8")
+
+
+@cache
+def _tree(module: str) -> ast.Module:
+    return ast.parse(_source(module))
 
 
 def _found(module: str, name: str, kind: type[Any]) -> Any:

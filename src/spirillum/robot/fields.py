@@ -8,7 +8,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from textwrap import dedent
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args
 
@@ -26,25 +25,20 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
+from spirillum.data_tables import field_texts
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.units import KINDS, Kind, parse_quantity
 
 
 def meanings(model: type[BaseModel]) -> dict[str, str]:
-    """Meanings of the fields of a table by their names; its own docstrings override inherited ones."""
-    ours = (part for part in reversed(model.__mro__) if part.__module__.startswith("spirillum."))
-    return {name: words for part in ours for name, words in _words(part) if name in model.model_fields}
-
-
-def _words(part: type) -> Iterator[tuple[str, str]]:
-    """Names that are declared in a class, with the texts that follow them."""
-    (definition,) = ast.parse(dedent(inspect.getsource(part))).body
-    assert isinstance(definition, ast.ClassDef)  # noqa: S101 - the source of a class
-    for field, below in pairwise(definition.body):
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
-            text = below.value.value if isinstance(below.value, ast.Constant) else None
-            if isinstance(text, str):
-                yield field.target.id, inspect.cleandoc(text)
+    """Meanings of the fields of a table by their names; those of a class override inherited ones."""
+    found: dict[str, str] = {}
+    for part in (part for part in reversed(model.__mro__) if part.__module__.startswith("spirillum.")):
+        source = dedent(inspect.getsource(part))
+        (definition,) = ast.parse(source).body
+        assert isinstance(definition, ast.ClassDef)  # noqa: S101 - the source of a class
+        found |= field_texts(definition, source.splitlines())
+    return {name: words for name, words in found.items() if words and name in model.model_fields}
 
 
 class Section(BaseModel):
