@@ -30,20 +30,13 @@ _MOST_DOUBLINGS = 10
 class Sampling:
     """How the sampler runs."""
 
-    ensembles: int = ENSEMBLES
-    """Independent ensembles."""
-    walkers: int = 0
-    """Walkers of each ensemble; 0: four times the number of coordinates, at least 24."""
-    warm_up: int = 400
-    """Steps that are thrown away."""
-    steps: int = 800
-    """Steps that are kept, at first."""
-    kept: int = 100
-    """Draws of each walker that stay in the answer."""
-    seed: int = 1
-    """Seed of the sampler."""
-    doublings: int = 3
-    """How often the length of the chains is doubled while they have not mixed."""
+    ensembles: int = ENSEMBLES  #: Independent ensembles.
+    walkers: int = 0  #: Walkers of each ensemble; 0: four times the number of coordinates, at least 24.
+    warm_up: int = 400  #: Steps that are thrown away.
+    steps: int = 800  #: Steps that are kept, at first.
+    kept: int = 100  #: Draws of each walker that stay in the answer.
+    seed: int = 1  #: Seed of the sampler.
+    doublings: int = 3  #: How often the length of the chains is doubled while they have not mixed.
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

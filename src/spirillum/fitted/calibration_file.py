@@ -58,49 +58,35 @@ _Entries = Annotated[
 class FittedValues(Section):
     """Fitted fields of the robot itself; what is not given stays as the robot has it."""
 
-    wire_diameter: Length | None = None
-    """`tail.wire_diameter`."""
-    viscosity: Viscosity | None = None
-    """`fluid.viscosity`."""
-    torque_constant: TorqueConstant | None = None
-    """`motor.torque_constant`."""
-    back_emf_constant: BackEmfConstant | None = None
-    """`motor.back_emf_constant`."""
-    normal_factor: Factor | None = None
-    """`model.rft.normal_factor`."""
-    tangential_factor: Factor | None = None
-    """`model.rft.tangential_factor`."""
-    friction: RotaryFriction | None = None
-    """`friction.effective`, one for all tails."""
+    wire_diameter: Length | None = None  #: `tail.wire_diameter`.
+    viscosity: Viscosity | None = None  #: `fluid.viscosity`.
+    torque_constant: TorqueConstant | None = None  #: `motor.torque_constant`.
+    back_emf_constant: BackEmfConstant | None = None  #: `motor.back_emf_constant`.
+    normal_factor: Factor | None = None  #: `model.rft.normal_factor`.
+    tangential_factor: Factor | None = None  #: `model.rft.tangential_factor`.
+    friction: RotaryFriction | None = None  #: `friction.effective`, one for all tails.
 
 
 class FittedFriction(Section):
     """B_eff of one tail in one channel."""
 
-    channel_diameter: Length
-    """Channel diameter."""
-    wavelength: Length
-    """Wavelength of the tail."""
-    amplitude: Length
-    """Amplitude of the tail."""
-    effective: RotaryFriction
-    """`friction.effective`."""
+    channel_diameter: Length  #: Channel diameter.
+    wavelength: Length  #: Wavelength of the tail.
+    amplitude: Length  #: Amplitude of the tail.
+    effective: RotaryFriction  #: `friction.effective`.
 
 
 class FittedPlace(Section):
     """Pose of the robot in its channel, for a model that computes the walls."""
 
-    channel_diameter: Length
-    """Channel diameter."""
-    placement: Placement
-    """The fitted fields of the placement."""
+    channel_diameter: Length  #: Channel diameter.
+    placement: Placement  #: The fitted fields of the placement.
 
 
 class FittedContact(Section):
     """Pose and contact of the robot in its channel, for a model that computes the walls."""
 
-    roughness: Length | None = None
-    """Height of the asperities under the robot."""
+    roughness: Length | None = None  #: Height of the asperities under the robot.
     friction_coefficient: Annotated[float | None, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)] = None
     """Coefficient of dry friction where they carry its weight."""
 
@@ -108,30 +94,19 @@ class FittedContact(Section):
 class Provenance(Section):
     """What the fitted values rest on."""
 
-    observations: _Word = ""
-    """Name of the observations file."""
-    sha256: _Word = ""
-    """Hash of that file."""
-    rows: Annotated[int, Field(strict=True, ge=0)] = 0
-    """Rows that were used."""
-    robots: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
-    """Robots that the rows belong to."""
-    model: Annotated[_Word, AfterValidator(_fitted_model)] = ""
-    """Hydrodynamic model that was fitted."""
-    method: _Word = ""
-    """Method of the fit."""
-    free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()
-    """Parameters that were free."""
-    answer: Literal["held", "trial"] = "held"
-    """Motion that was fitted."""
-    friction_reading: Literal["", "rotor", "paper"] = ""
-    """Reading of the friction under which B_eff was inferred."""
-    synthetic: Annotated[bool, Field(strict=True)] = False
-    """Whether the observations state that they are synthetic."""
+    observations: _Word = ""  #: Name of the observations file.
+    sha256: _Word = ""  #: Hash of that file.
+    rows: Annotated[int, Field(strict=True, ge=0)] = 0  #: Rows that were used.
+    robots: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()  #: Robots that the rows belong to.
+    model: Annotated[_Word, AfterValidator(_fitted_model)] = ""  #: Hydrodynamic model that was fitted.
+    method: _Word = ""  #: Method of the fit.
+    free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()  #: Parameters that were free.
+    answer: Literal["held", "trial"] = "held"  #: Motion that was fitted.
+    friction_reading: Literal["", "rotor", "paper"] = ""  #: Reading of the friction under which B_eff was inferred.
+    synthetic: Annotated[bool, Field(strict=True)] = False  #: Whether the observations state that they are synthetic.
     uncertainty: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
     """Fitted values with their uncertainty, for people."""
-    versions: _Word = ""
-    """Versions of the programs."""
+    versions: _Word = ""  #: Versions of the programs.
 
 
 class CalibrationFile(Section):
@@ -139,16 +114,12 @@ class CalibrationFile(Section):
 
     calibration: dict[Annotated[str, AfterValidator(known_model)], _Entries] = Field(default_factory=dict)
     """Factors for each model: one table, or a list of tables, one for each geometry that they were fitted to."""
-    fitted: FittedValues = FittedValues()
-    """Fitted fields of the robot itself."""
-    friction: Annotated[tuple[FittedFriction, ...], Field(max_length=100_000)] = ()
-    """B_eff, tail by tail."""
+    fitted: FittedValues = FittedValues()  #: Fitted fields of the robot itself.
+    friction: Annotated[tuple[FittedFriction, ...], Field(max_length=100_000)] = ()  #: B_eff, tail by tail.
     placement: Annotated[tuple[FittedPlace, ...], Field(max_length=1000)] = ()
     """Pose of the robot, channel by channel."""
-    contact: FittedContact = FittedContact()
-    """Asperities and dry friction under the robot."""
-    provenance: Provenance = Provenance()
-    """What the values rest on."""
+    contact: FittedContact = FittedContact()  #: Asperities and dry friction under the robot.
+    provenance: Provenance = Provenance()  #: What the values rest on.
 
     @model_validator(mode="after")
     def _something(self) -> Self:

@@ -30,10 +30,8 @@ class TailGrid(Section):
 
     channels: Annotated[dict[_Name, _Name], Field(min_length=1, max_length=1000)]
     """Name of each channel to its robot (preset or file), which carries channel, body, motor and calibration."""
-    wavelengths: Annotated[list[Length], Field(min_length=1)]
-    """Wavelengths of the tails."""
-    amplitudes: Annotated[list[Length], Field(min_length=1)]
-    """Amplitudes of the tails."""
+    wavelengths: Annotated[list[Length], Field(min_length=1)]  #: Wavelengths of the tails.
+    amplitudes: Annotated[list[Length], Field(min_length=1)]  #: Amplitudes of the tails.
 
 
 _Share = Annotated[float, BeforeValidator(in_range(0.0, 1.0)), Field(ge=0.0, le=1.0)]
@@ -43,18 +41,15 @@ _Coefficient = Annotated[float, BeforeValidator(in_range(0.0, 10.0)), Field(ge=0
 class LaidDown(Section):
     """Factors of release, each with its low and its high level; all of it assumed."""
 
-    gap: tuple[Length, Length] = (1e-4, 1e-3)
-    """Smallest distance of body and glass at release, low and high."""
+    gap: tuple[Length, Length] = (1e-4, 1e-3)  #: Smallest distance of body and glass at release, low and high.
     pitch: tuple[_Share, _Share] = (0.0, 0.5)
     """Nose up, over the steepest pitch that gap and tail allow, at which the tail is at the glass."""
-    wait: tuple[Time, Time] = (0.0, 60.0)
-    """Waiting time until the motor is switched on."""
+    wait: tuple[Time, Time] = (0.0, 60.0)  #: Waiting time until the motor is switched on.
     roughness: tuple[Length, Length] = (1e-6, 3e-5)
     """Height of the asperities: of a smooth hull, and of glued and printed stripes."""
     friction_coefficient: tuple[_Coefficient, _Coefficient] = (0.0, 0.3)
     """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15, allowed 0 to 10."""
-    duration: Time = 12.0
-    """Length of each run with the motor on."""
+    duration: Time = 12.0  #: Length of each run with the motor on.
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -86,8 +81,7 @@ class LaidDown(Section):
 class Contact(Section):
     """What robots rest on that are followed to their steady motions; assumed."""
 
-    roughness: Length | None = None
-    """Height of the asperities; unset: 1e-4 of the body's radius."""
+    roughness: Length | None = None  #: Height of the asperities; unset: 1e-4 of the body's radius.
     friction_coefficient: _Coefficient = FRICTION_COEFFICIENT
     """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
 
@@ -100,42 +94,35 @@ _Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
 class Study(Section):
     """A study: a grid or a list of robots, answered by some models under some friction models."""
 
-    title: _Name = "Study"
-    """Title of report and figures."""
-    note: Annotated[Text, Field(max_length=5000)] = ""
-    """Remarks on the study, such as assumptions."""
+    title: _Name = "Study"  #: Title of report and figures.
+    note: Annotated[Text, Field(max_length=5000)] = ""  #: Remarks on the study, such as assumptions.
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (AUTO,)
     """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` for robots in channels (missing
     tables are made first), and `slender` for robots without."""
     friction: Annotated[tuple[FrictionReading, ...], Field(min_length=1)] = ("none", "rotor", "paper")
     """Friction models."""
-    claims: Literal["none", "biorob2012"] = "none"
-    """Whose statements to hold the results against."""
+    claims: Literal["none", "biorob2012"] = "none"  #: Whose statements to hold the results against.
     assumed_motor_rates: Annotated[tuple[Rate, ...], Field(max_length=1000)] = ()
     """Motor rates at which B_eff is inferred as a curve, where no rates were observed."""
-    grid: TailGrid | None = None
-    """A grid of robots."""
+    grid: TailGrid | None = None  #: A grid of robots.
     robots: Annotated[list[_Name], Field(min_length=1, max_length=_MOST_ROBOTS)] | None = None
     """A list of robots (presets or files) instead of a grid."""
     vary: Annotated[dict[_Name, _Values], Field(default_factory=dict, max_length=20)]
     """Fields of the robot file with their values, such as `"tail.length" = ["40 mm", "60 mm"]`: every combination, for
     each of `robots`."""
-    placement: Placement = Placement()
-    """Poses of the robots in their channels, for models that compute the walls."""
+    placement: Placement = Placement()  #: Poses of the robots in their channels, for models that compute the walls.
     band: Annotated[bool, Field(strict=True)] = False
     """Compute such models over the poses that `placement` leaves open too: seconds with tables, else many minutes."""
     predicted: Annotated[bool, Field(strict=True)] = False
     """Also simulate release from rest in the tubes, with nothing fitted: minutes."""
-    laid_down: LaidDown = LaidDown()
-    """Levels of the factors of release."""
+    laid_down: LaidDown = LaidDown()  #: Levels of the factors of release.
     settled: Annotated[bool, Field(strict=True)] = False
     """Also find the steady state of each robot after release in its tube: some seconds a robot."""
     trial: Annotated[bool, Field(strict=True)] = False
     """Also simulate a trial of each robot in its tube, as `spirillum predict`: some seconds a robot."""
     interval: Annotated[bool, Field(strict=True)] = False
     """Also give the 90 % interval of each trial over its unknowns: half a minute a robot; a rerun resumes."""
-    contact: Contact = Contact()
-    """Contact of released robots, in steady states and trials."""
+    contact: Contact = Contact()  #: Contact of released robots, in steady states and trials.
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
