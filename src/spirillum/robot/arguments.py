@@ -20,10 +20,8 @@ class Options(Section):
     In a file they are a table, in Python one argument, on the command line options of the same names.
     """
 
-    argument: ClassVar[str] = "options"
-    """Name of the argument that takes them."""
-    prefixed: ClassVar[bool] = False
-    """Whether sentences name a field with its argument, as in `placement.gap`."""
+    argument: ClassVar[str] = "options"  #: Name of the argument that takes them.
+    prefixed: ClassVar[bool] = False  #: Whether sentences name a field with its argument, as in `placement.gap`.
 
     @classmethod
     def of(cls, value: Self | Mapping[str, Any] | None) -> Self:
@@ -122,8 +120,7 @@ def one_of(*allowed: str) -> Callable[[Any], Any]:
     return check
 
 
-_DEEPEST = 24
-"""Nested tables up to which fields are told apart: no robot file has more."""
+_DEEPEST = 24  # nested tables up to which fields are told apart: no robot file has more
 
 
 def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:

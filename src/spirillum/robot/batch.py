@@ -24,12 +24,9 @@ from spirillum.robot.tail_form import TailForm
 class Column(NamedTuple):
     """Source of a column of a batch, and its allowed values."""
 
-    path: str
-    """Dotted field of the robot file."""
-    unset: float = np.nan
-    """Value where the field is not set."""
-    optional: bool = False
-    """Whether a robot swims without it."""
+    path: str  #: Dotted field of the robot file.
+    unset: float = np.nan  #: Value where the field is not set.
+    optional: bool = False  #: Whether a robot swims without it.
     zero: bool = False
     signed: bool = False
     infinite: bool = False

@@ -62,8 +62,7 @@ def _reader(kind: Kind) -> Callable[[Any], float]:
 class AlsoReads:
     """For the JSON schema of a field: a form that its reader takes beside that of its type."""
 
-    form: Callable[[JsonSchemaValue], JsonSchemaValue]
-    """Schema of that form, from the schema of the type."""
+    form: Callable[[JsonSchemaValue], JsonSchemaValue]  #: Schema of that form, from the schema of the type.
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """See pydantic."""
@@ -71,8 +70,7 @@ class AlsoReads:
         return {"anyOf": [own, self.form(own)]}
 
 
-NONE = AlsoReads(lambda _: {"const": "none"})
-"""The word `none` for a table that is left out."""
+NONE = AlsoReads(lambda _: {"const": "none"})  #: The word `none` for a table that is left out.
 UNSET = BeforeValidator(lambda value: None if value == "none" else value)
 """A value that the word `none` takes away, also one of a preset."""
 
@@ -98,19 +96,15 @@ def _printable(text: str) -> str:
     return text
 
 
-Text = Annotated[str, AfterValidator(_printable)]
-"""Words for people; they end up in files, figures and on terminals."""
+Text = Annotated[str, AfterValidator(_printable)]  #: Words for people; they end up in files, figures and on terminals.
 
 
 class FieldValue(NamedTuple):
     """A field of a section with its value."""
 
-    path: str
-    """Dotted name in the file."""
-    value: Any
-    """Value; SI for a quantity, None where unset."""
-    unit: str | None
-    """SI unit of a quantity, None for anything else."""
+    path: str  #: Dotted name in the file.
+    value: Any  #: Value; SI for a quantity, None where unset.
+    unit: str | None  #: SI unit of a quantity, None for anything else.
 
     @property
     def text(self) -> str:
@@ -198,10 +192,8 @@ _OTHERWISE = {
 """Derived quantities that are no fields of a robot file, and their remedies."""
 _IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' reverses the tail's rotation"}
 """Remedies for out-of-range numbers whose meaning is expressed by another field."""
-_LONGEST_FIELD = 200
-"""Characters of a field's name in a sentence, so that what is allowed has room."""
-_MOST_NAMED = 6
-"""Fields with further problems that a sentence names."""
+_LONGEST_FIELD = 200  # characters of a field's name in a sentence, so that what is allowed has room
+_MOST_NAMED = 6  # fields with further problems that a sentence names
 _M = TypeVar("_M", bound=BaseModel)
 
 

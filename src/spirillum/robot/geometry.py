@@ -63,8 +63,7 @@ Taper = Annotated[
 ]
 
 
-ProfilePoints = tuple[tuple[float, float], ...]
-"""Points (x, r) along a body's outline, mm."""
+ProfilePoints = tuple[tuple[float, float], ...]  #: Points (x, r) along a body's outline, mm.
 
 
 Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "profile", "none"]
@@ -80,10 +79,8 @@ class CenterOfMass(Section):
 
     x: SignedLength | None = None
     """Place along the motor axis from the body's mid-length, positive towards the nose; unset: of uniform density."""
-    radial: LengthOrZero = 0.0
-    """Distance from the motor axis; the body then rights itself."""
-    angle: Angle = 0.0
-    """Its angle about +x from the lowest place (-z of the body), as an azimuth."""
+    radial: LengthOrZero = 0.0  #: Distance from the motor axis; the body then rights itself.
+    angle: Angle = 0.0  #: Its angle about +x from the lowest place (-z of the body), as an azimuth.
 
 
 CenterOfMassOrNone = Annotated[CenterOfMass | None, UNSET, NONE]
@@ -99,18 +96,14 @@ class Body(Section):
 
     shape: Shape = "capsule"
     """Outline of the body; `profile` is that of `body.profile`, `none`, as `body = "none"`, a bare tail."""
-    diameter: Length
-    """Largest diameter D_b (Table I)."""
-    length: Length
-    """Overall length L_b along the motor axis, ends included (Table I)."""
+    diameter: Length  #: Largest diameter D_b (Table I).
+    length: Length  #: Overall length L_b along the motor axis, ends included (Table I).
     front: EndOrNone = None
     """Front end of a capsule (default `hemisphere`) or cylinder (default `flat`); `none` is as if left out."""
     rear: EndOrNone = None
     """Rear end of a capsule (default `hemisphere`) or cylinder (default `flat`); `none` is as if left out."""
-    fillet: Length | None = None
-    """Edge radius of an end that is a `fillet`."""
-    mass: Mass | None = None
-    """Mass of body and coupling together (Table I), measured."""
+    fillet: Length | None = None  #: Edge radius of an end that is a `fillet`.
+    mass: Mass | None = None  #: Mass of body and coupling together (Table I), measured.
     center_of_mass: CenterOfMassOrNone = None
     """Centre of mass of the body alone, or `none` (here None) for a body of uniform density."""
     profile: ProfileOrNone = None
@@ -173,8 +166,7 @@ Stripes = Annotated[
 class Seal(Section):
     """The rear part of the body's surface and its stripes, by which a camera sees the body turn; for pictures only."""
 
-    length: Length
-    """Axial length from the body's rear."""
+    length: Length  #: Axial length from the body's rear.
     stripes: Stripes = ()
     """Colours of equally wide stripes around; the first is centred on +z, the next follow from there towards -y."""
 
@@ -185,8 +177,7 @@ SealOrNone = Annotated[Seal | None, _table_or_none("seal"), NONE]
 class Coupling(Section):
     """The mechanical coupling between motor and tail; it turns with the tail."""
 
-    diameter: LengthOrZero = 0.0
-    """Diameter D_c (Table I); 0 for a bare gap between body and tail."""
+    diameter: LengthOrZero = 0.0  #: Diameter D_c (Table I); 0 for a bare gap between body and tail.
     length: LengthOrZero = 0.0
     """Axial distance L_c from the body's rear to the tail's root (Table I); 0 for no coupling."""
     clearance: LengthOrZero = 0.0005
@@ -201,8 +192,7 @@ _SIZE = {
         {"type": "array"},
     ]
 }
-_VARYING = AlsoReads(lambda _: _SIZE)
-"""A length from the root to the tip, or points (distance from the root, value)."""
+_VARYING = AlsoReads(lambda _: _SIZE)  # A length from the root to the tip, or points (distance from the root, value)
 
 AlongOrNone = Annotated[
     Along | None, BeforeValidator(read_along), WithJsonSchema({"anyOf": [_NUMBERS, {"const": "none"}]})
@@ -229,16 +219,12 @@ class Tail(Section):
     """Wavelength lambda of the helix; `{ from = "20 mm", to = "30 mm" }` or a list of points where it varies."""
     amplitude: Annotated[Length, _VARYING]
     """Amplitude B_o: radius of the helix's centreline; `{ from = "1 mm", to = "3 mm" }` or points."""
-    length: Length
-    """Axial length L_t (Table I; the wire itself is longer)."""
-    wire_diameter: Length
-    """Wire diameter D_t (Table I)."""
-    handedness: Literal["right", "left"] = "right"
-    """Hand of the helix."""
+    length: Length  #: Axial length L_t (Table I; the wire itself is longer).
+    wire_diameter: Length  #: Wire diameter D_t (Table I).
+    handedness: Literal["right", "left"] = "right"  #: Hand of the helix.
     taper: Taper = 100.0
     """Shape constant c of the amplitude's rise from the root in eq. (10); `none` (here None) for a plain helix."""
-    density: Density | None = None
-    """Density of the wire."""
+    density: Density | None = None  #: Density of the wire.
     amplitude_along: AlongOrNone = None
     """Local over largest amplitude at shares of the length, written by an amplitude that varies."""
     wavelength_along: AlongOrNone = None
@@ -263,10 +249,8 @@ class Tail(Section):
 class Channel(Section):
     """A straight circular tube."""
 
-    diameter: Length
-    """Inner diameter D_ch (Table I)."""
-    length: Length | None = None
-    """Length L_ch (Table I)."""
+    diameter: Length  #: Inner diameter D_ch (Table I).
+    length: Length | None = None  #: Length L_ch (Table I).
 
 
 ChannelOrNone = Annotated[Channel | None, _table_or_none("channel"), NONE]
@@ -278,10 +262,8 @@ PressureOrNone = Annotated[Pressure | None, UNSET, NONE]
 class Fluid(Section):
     """A Newtonian liquid."""
 
-    viscosity: Viscosity
-    """Dynamic viscosity mu (Table I)."""
-    density: Density
-    """Density rho (Table I)."""
+    viscosity: Viscosity  #: Dynamic viscosity mu (Table I).
+    density: Density  #: Density rho (Table I).
     cavitation_pressure: PressureOrNone = 1e5
     """How far the pressure of a lubrication film may fall below its surroundings before the liquid cavitates, or `none`
     for films without a bound. Assumed: one atmosphere; a liquid with dissolved air may cavitate at a tenth of it."""
@@ -318,12 +300,9 @@ def amplitude_envelope(xi: Values, amplitude: Values, length: Values, taper: Val
 class Centreline(NamedTuple):
     """The wire's centreline in the frame of the body (origin at its mid-length on the motor axis)."""
 
-    position: Vectors
-    """Points, m."""
-    tangent: Vectors
-    """Unit tangents, pointing away from the root."""
-    stretch: Values
-    """Arc length per axial length, ds/dxi."""
+    position: Vectors  #: Points, m.
+    tangent: Vectors  #: Unit tangents, pointing away from the root.
+    stretch: Values  #: Arc length per axial length, ds/dxi.
 
 
 def centreline(

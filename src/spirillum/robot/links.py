@@ -27,38 +27,28 @@ from spirillum.robot.tail_form import PLAIN, TailForm
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PANELS_PER_TURN = 4
-_ROOT_LENGTHS = 60.0
-"""Number of lengths L_t/c after which the amplitude of a tapered wire is complete to rounding."""
+_ROOT_LENGTHS = 60.0  # number of lengths L_t/c after which the amplitude of a tapered wire is complete to rounding
 
 
 class HomogeneousSolid(NamedTuple):
     """A homogeneous solid of density 1, in the frame of the body at phase 0 of the tail; SI."""
 
-    volume: float
-    """Volume, m^3."""
-    centroid: Vectors
-    """Centroid of the volume, m, (3,)."""
-    inertia: Tensors
-    """Inertia about the centroid at density 1, m^5, (3, 3)."""
+    volume: float  #: Volume, m^3.
+    centroid: Vectors  #: Centroid of the volume, m, (3,).
+    inertia: Tensors  #: Inertia about the centroid at density 1, m^5, (3, 3).
 
 
-_NOTHING = HomogeneousSolid(0.0, np.zeros(3), np.zeros((3, 3)))
-"""A solid that is not there, at the origin."""
+_NOTHING = HomogeneousSolid(0.0, np.zeros(3), np.zeros((3, 3)))  # A solid that is not there, at the origin
 
 
 class Link(NamedTuple):
     """A rigid link in the frame of the body at phase 0 of the tail; SI."""
 
-    mass: float
-    """Mass, kg; NaN where `body.mass` or `tail.density` is needed and unset."""
-    centre: Vectors
-    """Centre of mass, m, (3,); NaN with the mass."""
-    inertia: Tensors
-    """Inertia about the centre of mass, kg m^2, (3, 3); NaN with the mass."""
-    volume: float
-    """Displaced volume, m^3."""
-    centroid: Vectors
-    """Centroid of the displaced volume (centre of buoyancy), m, (3,)."""
+    mass: float  #: Mass, kg; NaN where `body.mass` or `tail.density` is needed and unset.
+    centre: Vectors  #: Centre of mass, m, (3,); NaN with the mass.
+    inertia: Tensors  #: Inertia about the centre of mass, kg m^2, (3, 3); NaN with the mass.
+    volume: float  #: Displaced volume, m^3.
+    centroid: Vectors  #: Centroid of the displaced volume (centre of buoyancy), m, (3,).
 
 
 class Links(NamedTuple):

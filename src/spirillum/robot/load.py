@@ -34,10 +34,8 @@ _SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's", "dri
 _SIZE = ("body.diameter", "body.length")
 _WORDS = {"name", "description", "reference"}
 _DEEPEST = 8
-_MOST_LAYERS = 8
-"""Layered robot files."""
-_DENSEST = 22590.0
-"""Density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)."""
+_MOST_LAYERS = 8  # layered robot files
+_DENSEST = 22590.0  # density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
 PAPER_ROBOTS_TAKEN = Note.named("paper-robots", robots=" and ".join(PAPER_ROBOTS))
@@ -263,8 +261,7 @@ def _nested(path: str, value: Any) -> dict[str, Any]:
     return table
 
 
-_NONE_IS_A_VALUE = ("tail.taper",)
-"""Fields whose None, a plain helix, is another thing than their default."""
+_NONE_IS_A_VALUE = ("tail.taper",)  # fields whose None, a plain helix, is another thing than their default
 
 
 def _put(table: dict[str, Any], names: list[str], value: Any, path: str) -> None:

@@ -37,38 +37,28 @@ COLOURS: dict[str, Colour] = _colours("piece")
 """sRGB of the pieces, 0 to 1, the wire of copper; for pictures only."""
 _STEEL: Colour = (0.62, 0.64, 0.67)
 _WIRES = ("stub", "arm", "tail")
-_STEELS = (7000.0, 8300.0)
-"""Densities between which a wire is taken for steel, kg/m^3: brass begins at 8400."""
+_STEELS = (7000.0, 8300.0)  # densities between which a wire is taken for steel, kg/m^3: brass begins at 8400
 
 _AROUND_BODY, _AROUND_WIRE, _PER_TURN = 96, 24, 48
 """Sides of a body and of a wire, and points along a turn of the tail, at fineness 1."""
 _FINENESS = (0.1, 20.0)
-_TRIANGLE = 400.0
-"""Memory of a triangle with its share of vertices and colours, and while it is written, bytes."""
-_ROOT = 0.2
-"""Fraction of the tail's length within which a sharp bend belongs to the root."""
-_SHARPEST = 0.9
-"""Largest curvature of a swept wire, times its radius."""
+_TRIANGLE = 400.0  # memory of a triangle with its share of vertices and colours, and while it is written, bytes
+_ROOT = 0.2  # fraction of the tail's length within which a sharp bend belongs to the root
+_SHARPEST = 0.9  # largest curvature of a swept wire, times its radius
 
 
 @dataclass(frozen=True)
 class RobotMesh:
     """One piece of the robot: a closed surface, in the frame of the body, m."""
 
-    name: str
-    """`body`, `shaft`, `coupling`, `stub`, `arm` or `tail`."""
-    part: Literal["body", "rotor"]
-    """The link that it moves with."""
-    vertices: Samples = field(repr=False)
-    """(n, 3), m."""
-    faces: Faces = field(repr=False)
-    """Triangles, outward oriented, (m, 3)."""
-    colours: Samples = field(repr=False)
-    """sRGB of each triangle, 0 to 1, (m, 3)."""
+    name: str  #: `body`, `shaft`, `coupling`, `stub`, `arm` or `tail`.
+    part: Literal["body", "rotor"]  #: The link that it moves with.
+    vertices: Samples = field(repr=False)  #: (n, 3), m.
+    faces: Faces = field(repr=False)  #: Triangles, outward oriented, (m, 3).
+    colours: Samples = field(repr=False)  #: sRGB of each triangle, 0 to 1, (m, 3).
     regions: tuple[str, ...]
     """Regions of the surface: the piece's name; on the body also `seal`, `stripe 1`, `stripe 2`, ..."""
-    region: Faces = field(repr=False)
-    """Index of each triangle's region, (m,)."""
+    region: Faces = field(repr=False)  #: Index of each triangle's region, (m,).
 
     @property
     def volume(self) -> float:
@@ -92,8 +82,7 @@ class TailLine:
 
     points: Samples
     tangents: Samples
-    xi: Samples
-    """Axial distance from the root, m, (k,)."""
+    xi: Samples  #: Axial distance from the root, m, (k,).
 
 
 def is_steel(density: float | None) -> bool:

@@ -50,12 +50,9 @@ class RftOptions(Section):
     """Arc element in (12): printed `(l/L_t) dx`, or the true `ds` on the tapered root."""
     row4: Literal["kept", "zeroed"] = "kept"
     """Row 4 of the tail's matrix in (15): kept (correct), or zeroed as printed, for comparison."""
-    spin: Switch = False
-    """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
-    normal_factor: Factor = 1.0
-    """Fitted factor on the coefficient across the wire, c_n."""
-    tangential_factor: Factor = 1.0
-    """Fitted factor on the coefficient along the wire, c_t."""
+    spin: Switch = False  #: Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent.
+    normal_factor: Factor = 1.0  #: Fitted factor on the coefficient across the wire, c_n.
+    tangential_factor: Factor = 1.0  #: Fitted factor on the coefficient along the wire, c_t.
 
 
 class SbtOptions(Section):
@@ -63,8 +60,7 @@ class SbtOptions(Section):
 
     eps_constant: Literal["printed", "exact"] = "printed"
     """Constant of eps: the printed 2.6, or the exact `pi sqrt(e)/2` = 2.58981."""
-    spin: Switch = False
-    """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
+    spin: Switch = False  #: Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent.
 
 
 Accuracy = Literal["standard", "high"]
@@ -75,8 +71,7 @@ Phases = Annotated[int, Field(strict=True, ge=1, le=64)]
 class SlenderOptions(Section):
     """Options of the resolved tail and body."""
 
-    accuracy: Accuracy = "standard"
-    """Form of the wire and resolution of the surfaces."""
+    accuracy: Accuracy = "standard"  #: Form of the wire and resolution of the surfaces.
 
 
 TubeForm = Literal["auto", "table", "direct"]
@@ -89,25 +84,18 @@ class TubeOptions(Section):
     form: TubeForm = "auto"
     """`table` (see `spirillum prepare`), `direct` (the flow is solved for), or `auto`: the table where there is one."""
 
-    tolerance: Tolerance = 0.005
-    """Relative tolerance of the speed per turn, from which the resolution follows."""
-    phases: Phases = 3
-    """Number of phases of the tail, evenly over a turn, that an answer is averaged over."""
+    tolerance: Tolerance = 0.005  #: Relative tolerance of the speed per turn, from which the resolution follows.
+    phases: Phases = 3  #: Number of phases of the tail, evenly over a turn, that an answer is averaged over.
 
 
 class ModelOptions(Section):
     """Options of the hydrodynamic models."""
 
-    perrin: PerrinOptions = PerrinOptions()
-    """Body formulas."""
-    rft: RftOptions = RftOptions()
-    """Resistive force theory."""
-    sbt: SbtOptions = SbtOptions()
-    """Slender-body theory."""
-    slender: SlenderOptions = SlenderOptions()
-    """Resolved tail and body."""
-    tube: TubeOptions = TubeOptions()
-    """Resolved tail and body in their tube."""
+    perrin: PerrinOptions = PerrinOptions()  #: Body formulas.
+    rft: RftOptions = RftOptions()  #: Resistive force theory.
+    sbt: SbtOptions = SbtOptions()  #: Slender-body theory.
+    slender: SlenderOptions = SlenderOptions()  #: Resolved tail and body.
+    tube: TubeOptions = TubeOptions()  #: Resolved tail and body in their tube.
     beyond_stokes: Switch = False
     """Also answer at Reynolds numbers above 10, where inertia dominates and these models are wrong."""
 
@@ -140,29 +128,21 @@ class Resolution(Options):
 class FittedTo(Section):
     """The geometry that a calibration was fitted to; used outside it, the answer warns."""
 
-    channel_diameter: Length
-    """Channel diameter."""
-    body_diameter: Length
-    """Body diameter."""
-    body_length: Length
-    """Body length."""
+    channel_diameter: Length  #: Channel diameter.
+    body_diameter: Length  #: Body diameter.
+    body_length: Length  #: Body length.
 
 
 class Calibration(Section):
     """Factors on the isolated body's Perrin drag for one model (Table III)."""
 
-    body_drag: Factor = 1.0
-    """Factor on the axial translational drag D_x."""
-    body_rotation: Factor = 1.0
-    """Factor on the axial rotational drag E_x."""
-    source: Text = Field(min_length=1, max_length=500)
-    """Where the factors come from."""
-    fitted_to: FittedTo
-    """Geometry that they were fitted to."""
+    body_drag: Factor = 1.0  #: Factor on the axial translational drag D_x.
+    body_rotation: Factor = 1.0  #: Factor on the axial rotational drag E_x.
+    source: Text = Field(min_length=1, max_length=500)  #: Where the factors come from.
+    fitted_to: FittedTo  #: Geometry that they were fitted to.
 
 
-CALIBRATED = ("sbt", "rft", "slender")
-"""Models whose drag of the body a calibration may multiply."""
+CALIBRATED = ("sbt", "rft", "slender")  #: Models whose drag of the body a calibration may multiply.
 
 
 def known_model(name: str) -> str:
@@ -172,5 +152,4 @@ def known_model(name: str) -> str:
     return name
 
 
-Calibrations = dict[Annotated[str, AfterValidator(known_model)], Calibration]
-"""Calibration factors by model."""
+Calibrations = dict[Annotated[str, AfterValidator(known_model)], Calibration]  #: Calibration factors by model.

@@ -97,10 +97,8 @@ class Arc:
 class Smooth:
     """A smooth line through points (x, rho), m: cubic splines over the length of chords."""
 
-    knots: tuple[tuple[float, float], ...]
-    """Points from front to rear."""
-    rounded: tuple[bool, bool]
-    """Whether it meets the axis at a right angle at its start and at its end."""
+    knots: tuple[tuple[float, float], ...]  #: Points from front to rear.
+    rounded: tuple[bool, bool]  #: Whether it meets the axis at a right angle at its start and at its end.
 
     @cached_property
     def _splines(self) -> tuple[Any, Any]:
@@ -165,8 +163,7 @@ class Outline:
     """A closed solid of revolution: pieces from its front pole to its rear pole."""
 
     pieces: tuple[Piece, ...]
-    corners: tuple[bool, ...]
-    """Whether there is a sharp edge between each piece and the next."""
+    corners: tuple[bool, ...]  #: Whether there is a sharp edge between each piece and the next.
 
     def line(self, t: Samples) -> tuple[Samples, Samples]:
         """(x, rho) of the pieces one after the other, each at t from 0 to 1."""
@@ -259,12 +256,9 @@ def body_outline(
     return Outline((*nose, *side, *tail), tuple(corners))
 
 
-_CORNER = np.radians(20.0)
-"""Angle from one chord to the next above which a profile has a sharp edge there."""
-_SQUARE = np.radians(30.0)
-"""Angle of a chord from the axis's normal below which the pole where it ends is rounded."""
-_STRAIGHT = 3.0
-"""Length of a chord over those of its neighbours above which it is a straight piece."""
+_CORNER = np.radians(20.0)  # angle from one chord to the next above which a profile has a sharp edge there
+_SQUARE = np.radians(30.0)  # angle of a chord from the axis's normal below which the pole where it ends is rounded
+_STRAIGHT = 3.0  # length of a chord over those of its neighbours above which it is a straight piece
 
 
 @lru_cache(maxsize=64)

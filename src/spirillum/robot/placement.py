@@ -12,8 +12,7 @@ from spirillum.robot.arguments import Options
 from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw, refuse
 from spirillum.units import show
 
-Ends = Literal["open", "closed"]
-"""Ends of the channel: both open into a bath, or closed (no net flux)."""
+Ends = Literal["open", "closed"]  #: Ends of the channel: both open into a bath, or closed (no net flux).
 
 
 def gap_on_asperities(roughness: Samples | float) -> Samples:

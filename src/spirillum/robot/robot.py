@@ -19,8 +19,7 @@ from spirillum.robot.links import links_of, robot_solids
 from spirillum.robot.tables import Battery, Motor, RobotTables
 from spirillum.units import USUAL, Kind, display_unit, for_people, in_unit, parse_quantity, show, shown_in
 
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity, m/s^2 (3rd CGPM, 1901)."""
+STANDARD_GRAVITY = 9.80665  #: Standard acceleration of gravity, m/s^2 (3rd CGPM, 1901).
 
 
 class Derived(NamedTuple):

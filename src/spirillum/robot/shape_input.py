@@ -35,8 +35,7 @@ _COLUMN = re.compile(r"(\w+?)(?:(?:[\s_]+|\s*(?=[\[(]))[\[(]?([a-zµμ]+)[\])]?)
 """The name of a column and the unit behind it."""
 _SMOOTHED = {"spread": 0.02, "amplitude": 0.05, "length": 0.05}
 """Largest relative changes by smoothing without a caution, of `CentreLine`."""
-_TURNED = 0.5
-"""Cosine of the largest angle between neighbouring chords of a centre line."""
+_TURNED = 0.5  # cosine of the largest angle between neighbouring chords of a centre line
 
 
 def read_points(path: Path, columns: Sequence[str], field: str) -> list[list[float]]:

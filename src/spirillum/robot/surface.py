@@ -15,8 +15,7 @@ Faces: TypeAlias = Whole
 """Whole numbers, such as the three vertices of each triangle, counter-clockwise as seen from outside."""
 
 _LEAST_AROUND = 3
-_SHADED = 2100.0
-"""Memory of a triangle while its normals are averaged with its neighbours', bytes."""
+_SHADED = 2100.0  # memory of a triangle while its normals are averaged with its neighbours', bytes
 
 
 class Surface(NamedTuple):
@@ -24,21 +23,16 @@ class Surface(NamedTuple):
 
     vertices: Samples
     faces: Faces
-    band: Faces
-    """Index of each triangle's band, from the first pole to the last, (m,)."""
-    sector: Faces
-    """Index of each triangle's sector around the axis, (m,)."""
+    band: Faces  #: Index of each triangle's band, from the first pole to the last, (m,).
+    sector: Faces  #: Index of each triangle's sector around the axis, (m,).
 
 
 class OutlinePoints(NamedTuple):
     """Points of an outline from its front pole to its rear pole."""
 
-    x: Samples
-    """m, (k,)."""
-    rho: Samples
-    """Distance from the axis, m; zero at both poles, (k,)."""
-    flat: tuple[bool, ...]
-    """Whether each band, from a point to the next, is in a plane perpendicular to the axis."""
+    x: Samples  #: m, (k,).
+    rho: Samples  #: Distance from the axis, m; zero at both poles, (k,).
+    flat: tuple[bool, ...]  #: Whether each band, from a point to the next, is in a plane perpendicular to the axis.
 
 
 def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> OutlinePoints:

@@ -49,12 +49,9 @@ FrictionReading = Literal["none", "rotor", "body", "paper"]
 class TorqueCurve(NamedTuple):
     """Torque of a motor against its rate, straight between its points, in the motor's own sense; SI."""
 
-    rates: tuple[float, ...]
-    """Rates, rad/s: from 0, increasing."""
-    torques: tuple[float, ...]
-    """Torques, N m: not increasing, down to 0."""
-    sense: float
-    """1 where the motor turns the tail as its hand swims forward, else -1."""
+    rates: tuple[float, ...]  #: Rates, rad/s: from 0, increasing.
+    torques: tuple[float, ...]  #: Torques, N m: not increasing, down to 0.
+    sense: float  #: 1 where the motor turns the tail as its hand swims forward, else -1.
 
 
 class Drive(Section):
@@ -65,8 +62,7 @@ class Drive(Section):
     `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
     joint: Literal["revolute", "fixed"] = "revolute"
     """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
-    rate: Annotated[Rate | None, UNSET, NONE] = None
-    """For `rate`: rotation rate of the tail about +x in the lab."""
+    rate: Annotated[Rate | None, UNSET, NONE] = None  #: For `rate`: rotation rate of the tail about +x in the lab.
     torque: Annotated[Torque | None, UNSET, NONE] = None
     """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
     rates: Annotated[tuple[Rate, ...] | None, KINDS["rate"], UNSET, NONE] = None
@@ -128,18 +124,12 @@ _OF_ONE_KIND = {"rates": "torque-speed", "torques": "torque-speed", "rate": "rat
 class MotorResistance(Section):
     """Table II: R(I) = constant + decay exp(-decay_rate I) + growth exp(growth_rate I) + slope I."""
 
-    constant: Resistance
-    """Constant term."""
-    decay: Resistance = 0.0
-    """Amplitude of the term that decays with current."""
-    decay_rate: InverseCurrent = 0.0
-    """Rate of that decay."""
-    growth: Resistance = 0.0
-    """Amplitude of the term that grows with current."""
-    growth_rate: InverseCurrent = 0.0
-    """Rate of that growth."""
-    slope: ResistancePerCurrent = 0.0
-    """Slope of the linear term (with its sign)."""
+    constant: Resistance  #: Constant term.
+    decay: Resistance = 0.0  #: Amplitude of the term that decays with current.
+    decay_rate: InverseCurrent = 0.0  #: Rate of that decay.
+    growth: Resistance = 0.0  #: Amplitude of the term that grows with current.
+    growth_rate: InverseCurrent = 0.0  #: Rate of that growth.
+    slope: ResistancePerCurrent = 0.0  #: Slope of the linear term (with its sign).
 
 
 def _plain_resistance(value: Any) -> Any:
@@ -153,14 +143,10 @@ _PLAIN_RESISTANCE = AlsoReads(lambda _: quantity_schema(KINDS["resistance"]))
 class Motor(Section):
     """The DC-motor of eqs (17) and (18)."""
 
-    torque_constant: TorqueConstant
-    """Torque constant K_m (Table II)."""
-    back_emf_constant: BackEmfConstant
-    """Back-emf constant K_b (Table II)."""
-    inductance: Inductance
-    """Inductance L (Table II)."""
-    rotor_friction: RotaryFriction
-    """Friction B_m of the rotor alone, on the motor's shaft (Table II)."""
+    torque_constant: TorqueConstant  #: Torque constant K_m (Table II).
+    back_emf_constant: BackEmfConstant  #: Back-emf constant K_b (Table II).
+    inductance: Inductance  #: Inductance L (Table II).
+    rotor_friction: RotaryFriction  #: Friction B_m of the rotor alone, on the motor's shaft (Table II).
     resistance: Annotated[MotorResistance, BeforeValidator(_plain_resistance), _PLAIN_RESISTANCE]
     """Equivalent resistance R(I) of motor and driver (Table II): its terms, or one value such as `"10.4 ohm"`."""
     gear_ratio: Annotated[float, Field(strict=True, ge=1e-3, le=1e4, allow_inf_nan=False)] = 1.0
@@ -179,25 +165,19 @@ class Motor(Section):
 class Battery(Section):
     """Table II: V(I) = voltage - internal_resistance I at the terminals."""
 
-    voltage: Voltage
-    """Open-circuit voltage."""
-    internal_resistance: Resistance
-    """Voltage lost per current."""
-    capacity: Charge | None = None
-    """Rated charge."""
+    voltage: Voltage  #: Open-circuit voltage.
+    internal_resistance: Resistance  #: Voltage lost per current.
+    capacity: Charge | None = None  #: Rated charge.
 
 
 class Magnetic(Section):
     """A magnet fixed in the robot, and the uniform field that turns it about the lab's x axis."""
 
-    moment: MagneticMoment
-    """Magnetic moment m of the robot, fixed in it."""
+    moment: MagneticMoment  #: Magnetic moment m of the robot, fixed in it.
     moment_angle: MomentAngle = 0.5 * pi
     """Angle between the moment and the motor axis, towards +z at rest; 90 deg (the default) is across the axis."""
-    field: MagneticField
-    """Flux density B of the field, which is at right angles to its axis of rotation."""
-    rotation_rate: Rate
-    """Rotation rate of the field about +x in the lab."""
+    field: MagneticField  #: Flux density B of the field, which is at right angles to its axis of rotation.
+    rotation_rate: Rate  #: Rotation rate of the field about +x in the lab.
     axis: Literal["x"] = "x"
     """Axis about which the field turns: `x`, the lab's and the channel's; no other is computed."""
 
@@ -230,38 +210,23 @@ def _center_problems(body: Body) -> list[str]:
 class RobotTables(Section):
     """The tables of a robot file; SI inside, frozen. `Robot` adds what its geometry has to fulfil."""
 
-    name: Text = Field(default="robot", min_length=1, max_length=200)
-    """Name of the robot, for tables and figures."""
-    description: Text = Field(default="", max_length=2000)
-    """What it is, in a sentence."""
-    reference: Text = Field(default="", max_length=2000)
-    """Where its numbers come from."""
-    body: BodyOrNone
-    """The body, or `none` for a bare tail."""
+    name: Text = Field(default="robot", min_length=1, max_length=200)  #: Name of the robot, for tables and figures.
+    description: Text = Field(default="", max_length=2000)  #: What it is, in a sentence.
+    reference: Text = Field(default="", max_length=2000)  #: Where its numbers come from.
+    body: BodyOrNone  #: The body, or `none` for a bare tail.
     seal: SealOrNone = None
     """The striped seal at the body's rear, or `none` (here None) for a plain body; pictures and exports show it."""
-    coupling: CouplingOrNone = Coupling()
-    """The coupling between motor and tail, or `none`."""
-    tail: Tail
-    """The helical tail."""
-    channel: ChannelOrNone = None
-    """The channel, or `none` (here None)."""
-    fluid: Fluid
-    """The fluid."""
-    drive: Drive | None = None
-    """What turns the tail; without a drive an answer needs `--tail-rate`."""
-    motor: Motor | None = None
-    """The motor of a `dc-motor` drive."""
-    battery: Battery | None = None
-    """The battery of a `dc-motor` drive."""
-    magnetic: Magnetic | None = None
-    """The magnet and the rotating field of a `magnetic` drive."""
-    friction: Friction = Friction()
-    """Rotary friction."""
-    model: ModelOptions = ModelOptions()
-    """Options of the hydrodynamic models."""
-    calibration: Calibrations = Field(default_factory=dict)
-    """Calibration factors for each model."""
+    coupling: CouplingOrNone = Coupling()  #: The coupling between motor and tail, or `none`.
+    tail: Tail  #: The helical tail.
+    channel: ChannelOrNone = None  #: The channel, or `none` (here None).
+    fluid: Fluid  #: The fluid.
+    drive: Drive | None = None  #: What turns the tail; without a drive an answer needs `--tail-rate`.
+    motor: Motor | None = None  #: The motor of a `dc-motor` drive.
+    battery: Battery | None = None  #: The battery of a `dc-motor` drive.
+    magnetic: Magnetic | None = None  #: The magnet and the rotating field of a `magnetic` drive.
+    friction: Friction = Friction()  #: Rotary friction.
+    model: ModelOptions = ModelOptions()  #: Options of the hydrodynamic models.
+    calibration: Calibrations = Field(default_factory=dict)  #: Calibration factors for each model.
 
     _warnings: tuple[Note, ...] = PrivateAttr(default=())
 

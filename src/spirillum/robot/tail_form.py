@@ -15,26 +15,19 @@ Along = tuple[tuple[float, float], ...]
 CurvePoints = tuple[tuple[float, float, float], ...]
 """Points of a centre line in the tail's frame, mm: x from the root to the tip on the motor axis, right-handed."""
 
-_PER_GAP = 24
-"""Samples between two points of a centre line, from which its lengths and bends follow."""
-ROOT_SHARE = 0.05
-"""Share of the wires' length in which those of several starts may touch: there they are joined."""
+_PER_GAP = 24  # samples between two points of a centre line, from which its lengths and bends follow
+ROOT_SHARE = 0.05  #: Share of the wires' length in which those of several starts may touch: there they are joined.
 _SHARES: Samples = np.linspace(0.0, 1.0, 129)
 
 
 class TailForm(NamedTuple):
     """Form of a tail beyond its sizes: hashable, shared by the robots of a batch."""
 
-    starts: int = 1
-    """Identical wires, evenly spaced around the axis."""
-    amplitude: Along = ()
-    """Local amplitude over the largest."""
-    wavelength: Along = ()
-    """Local wavelength over the mean one, that of as many turns."""
-    curve: CurvePoints = ()
-    """A centre line in place of the helix, mm."""
-    tolerance: float = 0.0
-    """Root mean square distance by which smoothing may move its points, m."""
+    starts: int = 1  #: Identical wires, evenly spaced around the axis.
+    amplitude: Along = ()  #: Local amplitude over the largest.
+    wavelength: Along = ()  #: Local wavelength over the mean one, that of as many turns.
+    curve: CurvePoints = ()  #: A centre line in place of the helix, mm.
+    tolerance: float = 0.0  #: Root mean square distance by which smoothing may move its points, m.
 
     @classmethod
     def read(cls, values: Sequence[Any]) -> TailForm:
@@ -102,8 +95,7 @@ class TailForm(NamedTuple):
         return length * mean
 
 
-PLAIN = TailForm()
-"""One plain helix."""
+PLAIN = TailForm()  #: One plain helix.
 
 
 @lru_cache(maxsize=64)

@@ -26,12 +26,10 @@ from spirillum.arrays import Samples
 from spirillum.robot.outline import Outline, Piece, Segment
 from spirillum.robot.placement import Placement
 
-GAP_SHARE = 1.0 / 18.0
-"""Gap over the body's radius where a placement leaves it open: 0.5 mm for the paper's robot."""
+GAP_SHARE = 1.0 / 18.0  #: Gap over the body's radius where a placement leaves it open: 0.5 mm for the paper's robot.
 GAP_BAND = (1.0 / 90.0, 1.0 / 9.0)
 """Least and largest gap over the body's radius of the band over unknown gaps: 0.1 to 1 mm for the paper's robot."""
-STEEPEST_PITCH = 0.25 * np.pi
-"""Largest pitch of a placement, nose up or down, rad."""
+STEEPEST_PITCH = 0.25 * np.pi  #: Largest pitch of a placement, nose up or down, rad.
 _SAMPLES = np.linspace(0.0, 1.0, 257)  # rings of a curved piece
 _ROUNDS = 3  # each samples between the neighbours of the farthest ring so far; the distance is then exact
 _STEPS = 181  # pitches that are tried before the first contact is bracketed
@@ -45,12 +43,9 @@ _STILL = 1e-9  # step at which it ends, rad: the distance is then exact
 class TailClearance:
     """Smallest clearance of the wire from the wall."""
 
-    clearance: float
-    """Smallest distance between the wire's surface and the wall, m; negative where it cuts into it."""
-    phase: float
-    """Phase of the tail at which that happens, rad, 0 to 2 pi."""
-    index: int
-    """Number of the point of the centreline at which it happens."""
+    clearance: float  #: Smallest distance between the wire's surface and the wall, m; negative where it cuts into it.
+    phase: float  #: Phase of the tail at which that happens, rad, 0 to 2 pi.
+    index: int  #: Number of the point of the centreline at which it happens.
 
 
 @dataclass(frozen=True)
@@ -61,16 +56,12 @@ class TubePose:
     the right.
     """
 
-    radius: float
-    """R of the tube."""
-    offset: float
-    """e, distance of the body's mid-length below the tube's axis; NaN where the body does not fit."""
-    pitch: float = 0.0
-    """alpha, nose up."""
+    radius: float  #: R of the tube.
+    offset: float  #: e, distance of the body's mid-length below the tube's axis; NaN where the body does not fit.
+    pitch: float = 0.0  #: alpha, nose up.
     tail_drop: float = 0.0
     """Distance by which the tail's axis is lowered, across itself; the tail turns about the lowered axis."""
-    yaw: float = 0.0
-    """psi, nose to +y (to the left, seen along the tube)."""
+    yaw: float = 0.0  #: psi, nose to +y (to the left, seen along the tube).
 
     @classmethod
     def of(cls, placement: Placement, body: Outline, body_diameter: float, radius: float) -> TubePose:
