@@ -151,25 +151,7 @@ def _names() -> Mapping[str, frozenset[str]]:
     return spelled_names(list(_registry()), prefixes)
 
 
-_OTHER_MEASURES = (
-    ("rad/s", "1/s", "does not say what turns; allowed: rad/s, Hz, rpm, turn/s"),
-    (
-        "Pa s",  # on the labels of silicone oils
-        "m**2/s",
-        "is a unit of kinematic viscosity; allowed: the dynamic one, which is that times the density: 1000 cSt of an "
-        "oil of 970 kg/m^3 are 0.97 Pa s",
-    ),
-    (
-        "T",
-        "A/m",
-        "is a unit of magnetic field strength; allowed: the flux density in T: without magnetised matter 1 Oe is "
-        "0.1 mT, and 1 kA/m is 1.257 mT",
-    ),
-    ("N m", "kg m", "is mass times length; allowed: force times length, as N m (SI): 1 kgf cm is 0.09807 N m"),
-    ("N m/A", "kg m/A", "has a mass for a force; allowed: N m/A (SI): 1 kgf cm/A is 0.09807 N m/A"),
-    ("A m**2", "A m**2/kg", "is a moment per mass; allowed: the moment, as A m^2 (SI)"),
-    ("A m**2", "A/m", "is a magnetisation; allowed: the moment, which is that times the volume, as A m^2 (SI)"),
-)
+_OTHER_MEASURES = [tuple(row.values()) for row in rows_of("other_measures.csv")]
 """SI unit of a kind, that of a common mistake, and the end of the sentence."""
 
 

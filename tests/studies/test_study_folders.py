@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.studies.run import keep
+from spirillum.studies.work import ModelTask, run_job
 
 
 @pytest.fixture(autouse=True)
@@ -24,13 +24,14 @@ def test_interrupted_study_resumes_where_it_stopped(
     done: list[int] = []
     most = 3
 
-    def counted(number, part, folder):
-        if len(done) == most:
-            raise KeyboardInterrupt
-        done.append(number)
-        keep(number, part, folder)
+    def counted(job):
+        if isinstance(job.task, ModelTask):
+            if len(done) == most:
+                raise KeyboardInterrupt
+            done.append(job.number)
+        return run_job(job)
 
-    monkeypatch.setattr("spirillum.studies.run.keep", counted)
+    monkeypatch.setattr("spirillum.studies.run.run_job", counted)
     with pytest.raises(KeyboardInterrupt):
         sp.study(small, output=tmp_path / "out")
     assert not (tmp_path / "out" / "dataset.nc").exists()

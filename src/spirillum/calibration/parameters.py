@@ -193,7 +193,8 @@ def check_not_set(
             f"{observed[0]} is set, and the observations say the {observed[0].partition('.')[2]} of each tail; "
             "allowed: other fields"
         )
-    for known in _possible_models(model, free):
+    possible = [name for name in (WALLED, UNWALLED) if is_free_in(name, free)] or [UNWALLED]
+    for known in possible if model == AUTO else [find_swimmer_model(model, AUTO).name]:
         for name in free_names(free, known, released=released and known == WALLED):
             field = PARAMETERS[name].replaces.format(model=known)
             if field in asked:
@@ -201,13 +202,6 @@ def check_not_set(
                     f"{field} is set, and the fit of '{name}' ignores it; allowed: one of them (--free names "
                     "what is fitted)"
                 )
-
-
-def _possible_models(model: str, free: str | Sequence[str] | None) -> tuple[str, ...]:
-    """Models that may be fitted, with `auto` those of which the free numbers are."""
-    if model != AUTO:
-        return (find_swimmer_model(model, AUTO).name,)
-    return tuple(name for name in (WALLED, UNWALLED) if is_free_in(name, free)) or (UNWALLED,)
 
 
 def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, float]:

@@ -20,7 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, inertia_warnings, synthetic_warning
-from spirillum.calibration.parameters import DEFAULT_FREE, LEVEL, PARAMETERS, Coordinate, free_names
+from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, free_names
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.problem import Progress, UnexplainedError
 from spirillum.display import DisplayMixin, counted
@@ -51,12 +51,6 @@ _FREE_IN_TRIAL = "friction_coefficient,roughness"
 def _size(row: dict[str, Any]) -> float:
     """Largest misfit first."""
     return -abs(float(row["standard_deviations"]["value"]))
-
-
-def _fitted(fit: Calibrated, number: Coordinate) -> dict[str, Any]:
-    """A fitted number with its interval."""
-    found, unit = fit.values[number.label], number.parameter.unit or "1"
-    return quantity(found.value, unit, low=found.low, high=found.high, kind="interval", level=LEVEL)
 
 
 @dataclass(frozen=True)
@@ -158,7 +152,12 @@ class Ranking(DisplayMixin):
                 "difference": quantity(item.difference, "1", standard_error=self._known(item.difference_error)),
                 "largest_pareto_k": quantity(float(item.pareto.max()), "1"),
                 "discrepancy": {name: quantity(v.value, "1") for name, v in item.fit.discrepancy.items()},
-                "parameters": {c.label: _fitted(item.fit, c) for c in item.fit.problem.coordinates},
+                "parameters": {
+                    c.label: quantity(
+                        item.fit.values[c.label].value, c.parameter.unit or "1", **item.fit.values[c.label].interval
+                    )
+                    for c in item.fit.problem.coordinates
+                },
                 "fails_most_at": self.failures(item),
             }
             for item in self.ranked

@@ -99,7 +99,8 @@ def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> I
     except (InputError, KeyboardInterrupt, SystemExit):
         raise
     except Exception as error:  # a damaged file raises whatever the libraries meet first
-        raise InputError(f"{path} cannot be read ({_first_line(error)}); allowed: {what}") from error
+        first = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise InputError(f"{path} cannot be read ({first[:150]}); allowed: {what}") from error
 
 
 def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF, group: str | None = None) -> xr.Dataset:
@@ -117,10 +118,6 @@ def group_of(file: h5netcdf.File, group: str | None = None) -> xr.Dataset:
         H5NetCDFStore(file if group is None else file[group]), decode_times=False, cache=False
     ).load()
     return found
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:150]
 
 
 def _check(stored: h5py.File, path: Path, what: str, largest: int) -> None:

@@ -114,20 +114,16 @@ def _created(group: Any, name: str, item: Stored) -> Any:
         kind: dict[str, Any] = {"dtype": str}
     else:
         kind = {"dtype": item.dtype, "fill_value": np.nan if item.dtype == "float64" else 0}
+    plain = {key: one.tolist() if isinstance(one, np.ndarray) else one for key, one in item.attributes.items()}
     return group.create_array(
         name,
         shape=item.shape,
         chunks=tuple(max(part, 1) for part in item.chunk),
         dimension_names=item.dimensions,
-        attributes=_plain(item.attributes),
+        attributes=plain,
         compressors=[ZstdCodec(level=_LEVEL), Crc32cCodec()],
         **kind,
     )
-
-
-def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes as JSON has them."""
-    return {key: item.tolist() if isinstance(item, np.ndarray) else item for key, item in attributes.items()}
 
 
 def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:

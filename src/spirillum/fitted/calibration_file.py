@@ -35,11 +35,6 @@ _SAME = 1e-6  # relative difference up to which two geometries are the same
 _Word = Annotated[Text, Field(max_length=500)]
 
 
-def _as_list(value: Any) -> Any:
-    """A single table, as in a robot file, is a list of one."""
-    return [value] if isinstance(value, Mapping) else value
-
-
 def _fitted_model(name: str) -> str:
     """The name of a model that may have been fitted, or none."""
     if name and name not in SWIMMER_MODELS:
@@ -50,7 +45,7 @@ def _fitted_model(name: str) -> str:
 _Entries = Annotated[
     tuple[Calibration, ...],
     Field(min_length=1, max_length=1000),
-    BeforeValidator(_as_list),
+    BeforeValidator(lambda value: [value] if isinstance(value, Mapping) else value),  # a single table, as of a robot
     AlsoReads(lambda many: many["items"]),
 ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 from xml.sax.saxutils import escape
 
@@ -22,13 +23,9 @@ def rendered(
         lstrip_blocks=True,
         keep_trailing_newline=not escaped,
     )
-    environment.filters.update(filters or {}, attribute=_attribute, numbers=numbers)
+    as_attribute = partial(escape, entities={'"': "&quot;", "\n": "&#10;"})
+    environment.filters.update(filters or {}, attribute=as_attribute, numbers=numbers)
     return environment.get_template(file).render(**names)
-
-
-def _attribute(text: str) -> str:
-    """A text in quotes as XML has it."""
-    return escape(text, {'"': "&quot;", "\n": "&#10;"})
 
 
 def numbers(values: Iterable[float]) -> str:

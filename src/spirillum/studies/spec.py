@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.arguments import in_range
-from spirillum.robot.fields import Length, Rate, Section, Text, Time
+from spirillum.robot.fields import Length, Rate, Section, Text, Time, refuse
 from spirillum.robot.placement import Placement
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import left_open
@@ -54,11 +52,7 @@ class LaidDown(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         problems = []
-        texts: dict[str, Callable[[float], str]] = {
-            "gap": show_height,
-            "wait": "{:g} s".format,
-            "roughness": show_height,
-        }
+        texts = {"gap": show_height, "wait": "{:g} s".format, "roughness": show_height}
         for name in ("gap", "pitch", "wait", "roughness", "friction_coefficient"):
             low, high = getattr(self, name)
             if low >= high:
@@ -74,7 +68,7 @@ class LaidDown(Section):
                 "twice the gap"
             )
         if problems:
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+            raise refuse(*problems)
         return self
 
 
@@ -170,7 +164,7 @@ class Study(Section):
         elif self.size > LARGEST_STORED:
             problems.append(f"the study requests {self.size} results; allowed: at most {LARGEST_STORED}")
         if problems:
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+            raise refuse(*problems)
         return self
 
     def _problems_of_the_band(self) -> list[str]:

@@ -45,9 +45,19 @@ def settling_figure(settling: Settling) -> Figure:
         )
         panels = sheet.panels[0]
         add_letters(panels)
-        _gap(panels[0], settling)
-        _azimuth(panels[1], settling)
-        _tilt(panels[2], settling)
+        time, lengths = settling.way("time"), UnitPrefix.of(settling.way("gap"), "m")
+        lines = ({"gap": "blue"}, {"azimuth": "vermillion"}, _TILTS)
+        labels = (f"gap under the body ({lengths.unit})", "azimuth on the wall (deg)", "tilt against the wall (deg)")
+        for axes, colours, label in zip(panels, lines, labels, strict=True):
+            shown = lengths if "gap" in colours else np.rad2deg
+            for name, colour in colours.items():
+                axes.plot(time, shown(settling.way(name)), color=COLOURS[colour])
+                if settling.lying.state == "steady":
+                    axes.axhline(float(shown(np.array(getattr(settling.lying, name)))), **_STEADY)
+            axes.set_xlim(0.0, time[-1])
+            axes.set_xlabel("time (s)")
+            axes.set_ylabel(label)
+        panels[0].set_yscale("log")
         return sheet.finished()
 
 
@@ -62,43 +72,7 @@ def _notes(settling: Settling) -> list[str]:
     ]
 
 
-def _gap(axes: Axes, settling: Settling) -> None:
-    gap = settling.way("gap")
-    lengths = UnitPrefix.of(gap, "m")
-    axes.semilogy(settling.way("time"), lengths(gap), color=COLOURS["blue"])
-    if settling.lying.state == "steady":
-        _steady(axes, float(lengths(np.array(settling.lying.gap))))
-    _over_time(axes, settling)
-    axes.set_ylabel(f"gap under the body ({lengths.unit})")
-
-
-def _azimuth(axes: Axes, settling: Settling) -> None:
-    axes.plot(settling.way("time"), np.rad2deg(settling.way("azimuth")), color=COLOURS["vermillion"])
-    if settling.lying.state == "steady":
-        _steady(axes, np.rad2deg(settling.lying.azimuth))
-    _over_time(axes, settling)
-    axes.set_ylabel("azimuth on the wall (deg)")
-
-
-def _tilt(axes: Axes, settling: Settling) -> None:
-    for (name, colour), rest in zip(_TILTS.items(), (settling.lying.pitch, settling.lying.yaw), strict=True):
-        axes.plot(settling.way("time"), np.rad2deg(settling.way(name)), color=COLOURS[colour], label=name)
-        if settling.lying.state == "steady":
-            _steady(axes, np.rad2deg(rest))
-    _over_time(axes, settling)
-    axes.set_ylabel("tilt against the wall (deg)")
-
-
-def _over_time(axes: Axes, settling: Settling) -> None:
-    axes.set_xlim(0.0, settling.way("time")[-1])
-    axes.set_xlabel("time (s)")
-
-
 _STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewidth": 0.9}
-
-
-def _steady(axes: Axes, value: float) -> None:
-    axes.axhline(value, **_STEADY)
 
 
 def _legend(settling: Settling) -> list[Line2D]:
