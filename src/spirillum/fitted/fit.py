@@ -218,28 +218,21 @@ class Fit:
         words = f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
         return [Note("synthetic", words)]
 
-    def reading_warnings(self, readings: Sequence[str]) -> list[Note]:
-        """Whether B_eff is used under another reading than the one under which it was inferred."""
-        other = [name for name in readings if name in ("rotor", "paper") and name != self.reading]
-        if not (self.friction and self.reading and other):
-            return []
-        words = (
-            f"B_eff was inferred with friction '{self.reading}' and is another torque with '{other[0]}': rates and "
-            f"speeds do not follow from the observations; use '{self.reading}'"
-        )
-        return [Note("friction-other-fit", words, ("friction.effective",))]
-
-    def model_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[Note]:
-        """Whether B_eff is used with another model than the one whose torque it was inferred with."""
-        other = [name for name in models if name != self.model]
-        if not (self.friction and self.model and other and {"rotor", "paper"} & set(readings)):
-            return []
-        names = " and ".join(f"'{name}'" for name in other)
-        words = (
-            f"B_eff was inferred with model '{self.model}' and is another torque with {names}: rates and speeds do not "
-            f"follow from the observations; use '{self.model}'"
-        )
-        return [Note("friction-other-fit", words, ("friction.effective",))]
+    def torque_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[Note]:
+        """Whether B_eff is used with another friction model or model than those that it was inferred with."""
+        inferring = [name for name in readings if name in ("rotor", "paper")]
+        of = (("friction", self.reading, inferring), ("model", self.model, models if inferring else ()))
+        found = []
+        for what, own, used in of:
+            others = [name for name in used if name != own]
+            if self.friction and own and others:
+                named = " and ".join(f"'{name}'" for name in (others if what == "model" else others[:1]))
+                words = (
+                    f"B_eff was inferred with {what} '{own}' and is another torque with {named}: rates and speeds do "
+                    f"not follow from the observations; use '{own}'"
+                )
+                found.append(Note("friction-other-fit", words, ("friction.effective",)))
+        return found
 
     def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[Note]:
         """All notes beside a steady motion."""
@@ -254,8 +247,7 @@ class Fit:
         """All notes of a robot that is driven by its own motor."""
         return [
             *self.tail_warnings(robot),
-            *self.reading_warnings([reading]),
-            *self.model_warnings([model.name], [reading]),
+            *self.torque_warnings([model.name], [reading]),
             *self.geometry_warnings([robot], [model]),
             *self.origin_warnings([robot], [model]),
         ]

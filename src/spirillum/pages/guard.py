@@ -29,7 +29,6 @@ class Strangers:
     """Open connections without a key, the oldest first; used by the server's one thread."""
 
     def __init__(self, most: int = _MOST, patience: float = _PATIENCE) -> None:
-        """No connection yet."""
         self._most, self._patience = most, patience
         self._waiting: dict[_Address, tuple[asyncio.BaseTransport, asyncio.TimerHandle]] = {}
 
@@ -89,7 +88,6 @@ class Guard:
     """Checks of a request's credentials."""
 
     def __init__(self, host: str, port: int) -> None:
-        """A new key."""
         self.key = secrets.token_urlsafe(_KEY_BYTES)
         self._port = port
         self._names = {"localhost", host.lower()}
@@ -134,7 +132,6 @@ class MessageRate:
     """So many messages a second, and some more at once."""
 
     def __init__(self, each_second: float, at_once: float) -> None:
-        """Full at first."""
         self._rate, self._most = each_second, at_once
         self._left, self._last = at_once, time.monotonic()
 

@@ -42,7 +42,6 @@ class SetupEditor:
     """Setup of some videos; its methods are thread-safe."""
 
     def __init__(self, folder: Path, films: VideoStore) -> None:
-        """Start without a setup."""
         self._folder, self._films = folder, films
         self._lock = threading.RLock()
         self._fields: dict[str, Any] = dict(_START)
@@ -266,7 +265,6 @@ class MeasurementSession:
     """Videos, setup and results; its methods are thread-safe."""
 
     def __init__(self) -> None:
-        """Start without videos."""
         self._kept = ExitStack()
         self._folder = self._kept.enter_context(scratch_folder())
         atexit.register(self._kept.close)  # where the process ends before it has served

@@ -61,7 +61,6 @@ class SimulationThread:
     """Robots, clock and commands; made in one thread, run in its own."""
 
     def __init__(self, source: Any, publish: Callable[[], None]) -> None:
-        """Open the page's robots."""
         self._own = source if isinstance(source, str) and source in preset_names() else robot_tables(source)
         self._publish = publish
         self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)

@@ -28,7 +28,6 @@ class StudyPicture:
     """Tails of a study with their speeds."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
-        """Read what is shown."""
         needed = ("wavelength", "amplitude", "model", "channel")
         if "forward_velocity" not in dataset or any(name not in dataset.dims for name in needed):
             raise InputError(f"this dataset has not the dimensions {', '.join(needed)}; allowed: {_WHAT}")

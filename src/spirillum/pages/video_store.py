@@ -69,7 +69,6 @@ class Uploads:
     """Files and messages from when they are announced until they are read; used by the server's one thread."""
 
     def __init__(self) -> None:
-        """Start with an empty budget."""
         self._left = _LARGEST_TOGETHER
 
     @asynccontextmanager
@@ -100,7 +99,6 @@ class VideoStore:
     """Videos by the names of their trials; its methods are thread-safe."""
 
     def __init__(self, folder: Path) -> None:
-        """Start without videos."""
         self._folder = folder
         self._lock = threading.RLock()
         self._decoding = threading.Lock()  # one film at a time: a frame of many pixels takes much memory

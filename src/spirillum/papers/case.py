@@ -177,18 +177,14 @@ class CaseTrial(NamedTuple):
 
 def trials_of(case: Case, point: CasePoint) -> Iterator[CaseTrial]:
     """The trials of all assumptions that concern a point."""
-    for assumption in case.assumptions:
-        if point.assumed and (not assumption.points or point.label in assumption.points):
-            yield from _trials(assumption)
-
-
-def _trials(assumption: CaseAssumption) -> Iterator[CaseTrial]:
-    for number, value in enumerate(assumption.values):
-        fields = {path: values[number] for path, values in assumption.set.items()}
-        factors = {path: values[number] for path, values in assumption.scale.items()}
-        pose = {name: values[number] for name, values in assumption.placement.items()}
-        run = {name: values[number] for name, values in assumption.run.items()}
-        yield CaseTrial(assumption.name, value, fields, factors, pose, run)
+    for one in case.assumptions:
+        if point.assumed and (not one.points or point.label in one.points):
+            for number, value in enumerate(one.values):
+                changed: list[dict[str, Any]] = [
+                    {name: values[number] for name, values in table.items()}
+                    for table in (one.set, one.scale, one.placement, one.run)
+                ]
+                yield CaseTrial(one.name, value, *changed)
 
 
 def has_table(case: Case, point: CasePoint) -> bool:

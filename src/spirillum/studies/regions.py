@@ -241,7 +241,6 @@ class Pace:
     """The time that a study takes as a whole, from when its regions are done."""
 
     def __init__(self, robots: int, workers: int, clock: Callable[[], float] = monotonic) -> None:
-        """The study begins."""
         self._robots, self._workers, self._clock = robots, workers, clock
         self._start = self._from = clock()
         self._regions = self._done = self._before = 0

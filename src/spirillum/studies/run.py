@@ -189,8 +189,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     warnings += loaded.fit.idle_warnings(loaded.robots, requested)
     warnings += loaded.fit.geometry_warnings(loaded.robots, requested)
     warnings += loaded.fit.origin_warnings(loaded.robots, requested)
-    warnings += loaded.fit.reading_warnings(loaded.study.friction)
-    warnings += loaded.fit.model_warnings(loaded.study.models, loaded.study.friction)
+    warnings += loaded.fit.torque_warnings(loaded.study.models, loaded.study.friction)
     if loaded.friction:
         warnings += loaded.fit.tails_warnings([loaded.robot_at(index) for index in range(loaded.count)])
     models = loaded.study.models

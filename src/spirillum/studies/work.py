@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import PerRobot, Values
+from spirillum.data_tables import rows_of
 from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
@@ -38,36 +39,7 @@ WITH_INTERVALS = (
     "motor_current",
 )
 """Quantities that have intervals where a posterior is given."""
-REASONS = (
-    "answered",
-    "body-wider-than-channel",
-    "coupling-wider-than-channel",
-    "tail-wider-than-channel",
-    "robot-longer-than-channel",
-    "turns-touch",
-    "wire-too-thick-for-coil",
-    "too-many-turns",
-    "coil-too-tight",
-    "outside-slender-body-theory",
-    "tail-in-body",
-    "film-too-thin",
-    "wire-too-thin",
-    "wire-too-short",
-    "solid-too-slim",
-    "wire-too-thick-for-rft",
-    "wire-touches-floor",
-    "wire-too-close-to-floor",
-    "no-channel",
-    "no-channel-length",
-    "gap-too-wide",
-    "tail-in-wall",
-    "gap-too-thin",
-    "beyond-stokes",
-    "other",
-    "several-starts",
-    "no-plain-helix",
-    "no-body",
-)
+REASONS = tuple(row["reason"] for row in rows_of("studies/reasons.csv"))
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
 
 _ENDINGS = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")

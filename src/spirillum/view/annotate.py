@@ -62,7 +62,6 @@ class Annotator:
     """Overlay of tracking results on frames of one robot."""
 
     def __init__(self, robot: Robot, period: float = 2.0 * math.pi) -> None:
-        """Prepare the outline and the wire."""
         from spirillum.robot.mesh import tail_line
 
         self._cv2 = import_optional("cv2", "an annotated video", "video")

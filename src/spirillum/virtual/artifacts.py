@@ -238,7 +238,6 @@ class ViewArtifacts:
     """Artifacts between the robot and a picture of it: mirrored lamps, cables, a moving or unfocused camera."""
 
     def __init__(self, troubles: Troubles, seed: int, size: tuple[int, int]) -> None:
-        """Prepare."""
         self._shake, self._blurred = Shake(troubles, seed), troubles.blurred
         self._cables = _cables(troubles.cables, seed, size) if troubles.cables else None
         self._lamps = _mirrored_lamps(troubles.mirrored_lamps, seed, size) if troubles.mirrored_lamps else None

@@ -45,7 +45,6 @@ class Disturbances:
         body: tuple[float, float],
         top: float,
     ) -> None:
-        """Draw the random numbers."""
         self._degradation, self._seed, self._lens, self._body = degradation, seed, lens, body
         rng = np.random.default_rng([seed, _LAMP])
         self._linear = bool(rng.integers(2))

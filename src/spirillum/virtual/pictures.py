@@ -41,7 +41,6 @@ class Cover:
     """The glass before a robot's seal: its surface to draw, and what is seen through it."""
 
     def __init__(self, robot: Robot, index: float, still: Backdrop, lamps: Lamps, side: float) -> None:
-        """Prepare."""
         from scipy.ndimage import gaussian_filter
 
         body = next(piece for piece in robot_mesh(robot) if piece.name == "body")
@@ -152,7 +151,6 @@ class Painter:
     def __init__(
         self, robot: Robot, tank: Tank, lens: VirtualLens, edges: Samples | None = None, *, covered: bool = False
     ) -> None:
-        """Prepare."""
         self.robot, self.tank, self.lens = robot, tank, lens
         self.body, self.rotor = solids_of(robot, edges=edges, covered=covered)
         self.still = backdrop(tank, lens)
@@ -297,7 +295,6 @@ class FrameEncoder:
         exposure: float,
         view: ViewArtifacts | None = None,
     ) -> None:
-        """Prepare."""
         self._view = view
         self._painter, self._disturbances, self._trajectory = painter, disturbances, trajectory
         self._exposure = exposure

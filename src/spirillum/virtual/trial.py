@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from spirillum.files import (
     writable_target,
     write_dataset,
 )
-from spirillum.formats.h264 import h264_writer
+from spirillum.formats.h264 import H264Writer, h264_writer
 from spirillum.notes import Note
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
@@ -59,13 +59,6 @@ _QUALITY = {"preset": "veryfast", "x264-params": "mbtree=0"}
 _THREADS = 2  # threads of the encoder, a fixed number, so that a seed determines the bytes
 
 
-class FrameWriter(Protocol):
-    """Takes frames, one after the other."""
-
-    def add(self, image: np.ndarray, number: int) -> None:
-        """Append a frame, (height, width, 3) sRGB bytes, that was recorded as this number, counted from 0."""
-
-
 def video_target(path: str | Path) -> Path:
     """The video to write, or the folder for its frames."""
     path = Path(path)
@@ -81,7 +74,7 @@ def video_target(path: str | Path) -> Path:
 @contextmanager
 def video_writer(
     target: Path, size: tuple[int, int], fps: float, crf: int, tags: Mapping[str, str]
-) -> Iterator[FrameWriter]:
+) -> Iterator[H264Writer | _Pngs]:
     """A writer of a video; it appears, complete, when the block ends."""
     if target.suffix.lower() != ".mp4":
         with atomic_folder(target) as part:
@@ -362,7 +355,7 @@ def _facts(
 
 
 def _write_frames(
-    writer: FrameWriter,
+    writer: H264Writer | _Pngs,
     frames: FrameEncoder,
     numbers: tuple[np.ndarray, np.ndarray],
     fps: float,

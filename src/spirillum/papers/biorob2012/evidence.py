@@ -185,7 +185,6 @@ class FrictionModelRuns:
     """Readings of a study's robots, one for each run and window of the design."""
 
     def __init__(self, evidence: Evidence) -> None:
-        """Read a study with released robots."""
         self.evidence = evidence
         self._dataset = evidence.dataset
         self._levels = levels_of_readings()

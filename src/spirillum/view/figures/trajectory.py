@@ -63,23 +63,9 @@ def _panels(run: str) -> list[_Panel]:
     return found
 
 
-_LOOK_OF: dict[str, tuple[str, Any]] = {
-    "tail": ("blue", "-"),
-    "body": ("orange", "--"),
-    "motor": ("green", (0, (1, 1.2))),
-    "pitch": ("blue", "-"),
-    "yaw": ("vermillion", "--"),
-    "under the tail": ("vermillion", "--"),
-    "weight": ("black", "--"),
-    "film": ("blue", "-"),
-    "other fluid": ("green", (0, (1, 1.2))),
-    "asperities": ("vermillion", "-."),
-    "electrical": ("black", "-"),
-    "shaft": ("blue", "--"),
-    "drive": ("blue", "--"),
-    "friction": ("vermillion", (0, (1, 1.2))),
-    "joint friction": ("vermillion", (0, (1, 1.2))),
-    "dissipated": ("green", "-."),
+_DOTS: dict[str, Any] = {"dots": (0, (1, 1.2))}  # line styles that matplotlib has no name for
+_LOOK_OF = {
+    row["label"]: (row["colour"], _DOTS.get(row["line"], row["line"])) for row in rows_of("view/figures/run_lines.csv")
 }
 """Colour and line of a quantity by its label in the legend."""
 _MAIN = ("velocity $U_x$", "gap", "gap to the wall", "rate")  # panels of the short figure, the first two that a run has

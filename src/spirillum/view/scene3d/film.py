@@ -44,7 +44,6 @@ class CrossSection:
     """Inset with the cross-section, in all frames of a video: seen from the front, y to the right and z up."""
 
     def __init__(self, size: tuple[int, int], robot: Robot, poses: Poses) -> None:
-        """Prepare the inset."""
         from matplotlib import font_manager
         from PIL import ImageFont
 

@@ -86,7 +86,6 @@ class Stamp:
     """Time stamp in the upper right corner of a video's frames, and the ratio of its speed to the run's."""
 
     def __init__(self, size: tuple[int, int], times: Samples, speed: float) -> None:
-        """Prepare the digits."""
         from matplotlib import font_manager
         from PIL import ImageFont
 

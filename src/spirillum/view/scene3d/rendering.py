@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.formats.h264 import h264_writer
+from spirillum.formats.h264 import H264Writer, h264_writer
 from spirillum.optional_dependencies import import_optional
 
 _INSTEAD = "allowed: a display, or -o FILE, which needs none"
@@ -101,14 +101,9 @@ _PALETTE_FRAMES = 9
 _QUALITY = {"crf": "18", "preset": "veryfast"}
 
 
-class Writer(Protocol):
-    """Sequential writer of a video's frames."""
-
-    def add(self, image: np.ndarray) -> None:
-        """Append a frame, (height, width, 3) sRGB bytes."""
-
-
-def film_writer(path: Path, size: tuple[int, int], fps: int, words: dict[str, str]) -> AbstractContextManager[Writer]:
+def film_writer(
+    path: Path, size: tuple[int, int], fps: int, words: dict[str, str]
+) -> AbstractContextManager[H264Writer | _Gif]:
     """A writer for frames of one size; the file is complete when the block ends."""
     if path.suffix.lower() == ".gif":
         return _gif(path, fps, words)
@@ -151,7 +146,7 @@ class _Gif:
 
 
 @contextmanager
-def _gif(path: Path, fps: int, words: dict[str, str]) -> Iterator[Writer]:
+def _gif(path: Path, fps: int, words: dict[str, str]) -> Iterator[_Gif]:
     writer = _Gif(fps)
     yield writer
     pictures = writer.pictures()
