@@ -30,7 +30,8 @@ class CoreBuildHook(BuildHookInterface[Any]):
         else:
             libraries = build["compile_all"]()
             self.app.display_info(f"compiled csrc/ for {tag} by {' '.join(command)}")
-        build_data["artifacts"] += [path.relative_to(self.root).as_posix() for path in libraries]
+        made = (*libraries, build["STUBS"])
+        build_data["artifacts"] += [path.relative_to(self.root).as_posix() for path in made]
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{tag}"
 

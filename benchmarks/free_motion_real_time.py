@@ -16,7 +16,7 @@ import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.start import start_state
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels import rigid_links, stiff_steps
+from spirillum.kernels import core, rigid_links
 from spirillum.robot.placement import Placement
 
 TURNS = 100.0
@@ -57,7 +57,7 @@ def main() -> None:
     data, no_table, dy = links.data, links.table, np.empty(rigid_links.STATES)
 
     def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
-        stiff_steps.rates(dy, t, y, data, no_table)
+        core.rates(dy, t, y, data, no_table)
         return dy.copy()
 
     start, tolerance = start_state(robot, Placement(), lying=True), TwoLinks.tolerance

@@ -33,7 +33,7 @@ from spirillum.fluid.tube.outer_resistance import (
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import RESPONSES, response_errors
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import cut_of_film, film_at
+from spirillum.kernels.core import cut_of_film, film_at
 from spirillum.robot.batch import RobotBatch
 
 _TRUE = 15

@@ -159,8 +159,13 @@ static void close_step(const Block *b, int64_t k, const AxialRobot *p, AxialStat
     state->heat += p->motor.inductance * loss - emf * squares;
 }
 
-EXPORT void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
-                          double fineness, int64_t count) {
+/* Take robots over a time, each at its own duty and flow.
+ *
+ * states: changed in place, NaN where duty, flow or parameters are none;
+ * dt: s, positive; duty: 0 to 1; flow: imposed mean flow, m/s; fineness: number of pieces, relative to the normal one. */
+EXPORT void advance_axial(const double *parameters /* (count, 18) */, double *states /* (count, 7) */, double dt,
+                          const double *duty /* (count) */, const double *flow /* (count) */, double fineness,
+                          int64_t count) {
     Block block;
     for (int64_t low = 0; low < count; low += BLOCK) {
         const int64_t width = count - low < BLOCK ? count - low : BLOCK;
@@ -173,9 +178,11 @@ EXPORT void advance_axial(const double *parameters, double *states, double dt, c
     }
 }
 
-/* The same of robots whose motor has a curve, its torque in place of the current: it is constant over a step. */
-EXPORT void advance_on_curve(const double *parameters, double *states, double dt, const double *duty,
-                             const double *flow, const double *curve, int64_t count) {
+/* The same of robots whose motor has a curve, see `curve_torques`: its torque, N m, stands in place of the current, with a
+ * torque constant of 1. It is constant over a step. */
+EXPORT void advance_on_curve(const double *parameters /* (count, 18) */, double *states /* (count, 7) */, double dt,
+                             const double *duty /* (count) */, const double *flow /* (count) */,
+                             const double *curve /* (25) */, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
         const AxialRobot *p = (const AxialRobot *)parameters + n;
         AxialState *state = (AxialState *)states + n;
@@ -189,8 +196,9 @@ EXPORT void advance_on_curve(const double *parameters, double *states, double dt
     }
 }
 
-/* Derivative of the state, which rests on the current alone. */
-EXPORT void axial_rates(const double *parameters, double current, double duty, double flow, double *out) {
+/* Derivative of the state of one robot at a current, A, a duty and an imposed mean flow, m/s. */
+EXPORT void axial_rates(const double *parameters /* (18) */, double current, double duty, double flow,
+                        double *out /* (7) */) {
     const AxialRobot *p = (const AxialRobot *)parameters;
     const Motor *m = &p->motor;
     const double torque = m->torque_constant * current, square = current * current;
@@ -216,9 +224,13 @@ static double sliding_speed(const double r[3][3], double drag, double radius, do
 }
 
 /* Drag k = force/s of dry friction at a contact that slides at s, N s/m: k s(k) grows with k, so its logarithm is
- * bisected between free sliding and sticking. */
-EXPORT void contact_drag(const double *resistances, const double *force, const double *radius, const double *rate,
-                         double smooth, double *out, int64_t count) {
+ * bisected between free sliding and sticking.
+ *
+ * resistances: resistance of the whole robot against U, Omega and omega; force: mu_c N, N; radius: of the body, m;
+ * rate: omega of the tail, rad/s; smooth: v_r over the speed of a body that turns as fast as its tail. */
+EXPORT void contact_drag(const double *resistances /* (count, 3, 3) */, const double *force /* (count) */,
+                         const double *radius /* (count) */, const double *rate /* (count) */, double smooth,
+                         double *out /* (count) */, int64_t count) {
     const double (*r)[3][3] = (const double (*)[3][3])resistances;
     for (int64_t n = 0; n < count; n++) {
         const double slow = smooth * radius[n] * fabs(rate[n]);

@@ -19,8 +19,9 @@ static Apart apart(const double *points, const double *e2, int64_t i, int64_t j)
     return a;
 }
 
-/* Velocities at points from unit forces at the same points, symmetric, (n, 3, n, 3). */
-EXPORT void force_matrix(const double *points, const double *e2, double *matrix, int64_t n) {
+/* Fill in the velocities at points from unit forces at the same points, symmetric. */
+EXPORT void force_matrix(const double *points /* (n, 3) */, const double *e2 /* (n) */,
+                         double *matrix /* (n, 3, n, 3) */, int64_t n) {
     for (int64_t i = 0; i < n; i++) {
         for (int64_t j = 0; j <= i; j++) {
             const Apart a = apart(points, e2, i, j);
@@ -77,10 +78,13 @@ static double gradient(const Apart *a, const double m_y[9], const Contracted *y,
     return -(a_2 * outer + a_1 * same + b_2 * y->xmx * x->xmx + b_1 * mixed + b_0 * crossed);
 }
 
-/* What unit first moments at points do, trace-free tensors (n, q, 3, 3): velocities, (n, 3, n, q), and velocity
- * gradients along the moments, symmetric, (n, q, n, q). */
-EXPORT void moment_matrices(const double *points, const double *e2, const double *moments, double *velocities,
-                            double *gradients, int64_t n, int64_t q) {
+/* Fill in what unit first moments at points do.
+ *
+ * points: m; e2: square of the blob radius of each point; moments: trace-free tensors of the moments at each point,
+ * force by displacement; gradients: of the velocities along the moments, symmetric. */
+EXPORT void moment_matrices(const double *points /* (n, 3) */, const double *e2 /* (n) */,
+                            const double *moments /* (n, q, 3, 3) */, double *velocities /* (n, 3, n, q) */,
+                            double *gradients /* (n, q, n, q) */, int64_t n, int64_t q) {
     Contracted here[q], there[q];
     for (int64_t i = 0; i < n; i++) {
         for (int64_t j = 0; j < n; j++) {

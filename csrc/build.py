@@ -1,6 +1,7 @@
 """Compiles csrc/ into the package: by the system's C compiler, else by the one that comes as a wheel (ziglang).
 
-The build hook of the package calls it. In a clone on PYTHONPATH, after a change of csrc/: `python csrc/build.py`.
+The build hook of the package calls it. In a clone on PYTHONPATH, after a change of csrc/: `python csrc/build.py`. What
+Python calls is declared once, in C (see core.h): the module kernels/core.py is written from these declarations.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -39,6 +41,15 @@ TARGETS = {
     "win_amd64": "x86_64-windows-gnu",
 }
 """What zig calls the platform of a wheel."""
+
+
+STUBS = PACKAGE / "core.py"
+_EXPORTED = re.compile(
+    r"/\*(?P<doc>(?:(?!\*/).)*)\*/\nEXPORT (?P<type>\w+) (?P<name>\w+)\((?P<arguments>(?!void).*?)\) \{", re.DOTALL
+)
+_ARGUMENT = re.compile(r"(?:const )?(?P<type>\w+) (?P<name>[^/]*?)\s*(?:/\* \((?P<shape>.*?)\) \*/)?,")
+_NUMBERS = {"void": "None", "double": "float", "int64_t": "int", "bool": "bool"}
+_ARRAYS = {"float": "Float32", "int64_t": "Int64", "uint8_t": "UInt8", "Amplitude": "Complex128"}  # else of doubles
 
 
 class Compiler(NamedTuple):
@@ -84,9 +95,42 @@ def digest() -> str:
 
 
 def is_current() -> bool:
-    """Whether the package's library was compiled from these sources."""
+    """Whether the package's library and stubs were made from these sources."""
     library = PACKAGE / f"_core{compiler().suffix}"
-    return library.exists() and digest().encode() in library.read_bytes()
+    made = library.exists() and STUBS.exists()
+    return made and digest().encode() in library.read_bytes() and STUBS.read_text(encoding="utf-8") == stubs()
+
+
+def stubs() -> str:
+    """Return the module of stubs: for each exported function its arguments, but for lengths, and its comment."""
+    found = [
+        '"""The functions of csrc/, as C declares them; written by csrc/build.py."""\n',
+        "from __future__ import annotations\n",
+        "from spirillum.kernels.native import Array, Complex128, Float32, Float64, Int64, UInt8, native\n",
+    ]
+    for path in sorted(SOURCES.glob("*.c")):
+        found += [_stub(exported, path.name) for exported in _EXPORTED.finditer(path.read_text(encoding="utf-8"))]
+    return "\n".join(found)
+
+
+def _stub(exported: re.Match[str], source: str) -> str:
+    doc = re.sub(r"\n \*", "\n", exported["doc"]).replace("\n ", "\n    ").strip()
+    rows = re.search(r"\n *Threads share (\w+)\.", doc)
+    options, arguments, lengths = [f'rows="{rows[1]}"'] if rows else [], [], set[str]()
+    for kind, declared, shape in _ARGUMENT.findall(exported["arguments"] + ","):
+        name = re.search(r"(\w+)\W*(?:\[.*)?$", declared)[1]  # type: ignore[index]
+        if name in lengths:
+            continue
+        if declared == name:
+            arguments.append(f"{name}: {_NUMBERS[kind]}")
+            continue
+        sizes = shape.split(", ") if shape else re.findall(r"\d+", declared)
+        lengths |= set(sizes)
+        arguments.append(f'{name}: {_ARRAYS.get(kind, "Float64")}[Array, "{" ".join(sizes)}"]')
+        if f"const {kind} {declared}" not in exported["arguments"]:
+            options.insert(0, f'"{name}"')
+    head = f"def {exported['name']}({', '.join(arguments)}) -> {_NUMBERS[exported['type']]}:"
+    return f'\n@native({", ".join(options)})\n{head}\n    """{doc}\n\n    See csrc/{source}.\n    """\n'
 
 
 def compile_all(folder: Path = PACKAGE, flags: tuple[str, ...] = (), *, wide: bool = True) -> list[Path]:
@@ -96,6 +140,8 @@ def compile_all(folder: Path = PACKAGE, flags: tuple[str, ...] = (), *, wide: bo
     the processor takes it: its `_core` holds nothing but that question.
     """
     every, tag = sorted(SOURCES.glob("*.c")), compiler().tag
+    if folder == PACKAGE:
+        STUBS.write_text(stubs(), encoding="utf-8")
     core, wide_core = (folder / f"_core{name}{compiler().suffix}" for name in ("", "_v3"))
     machine = tag if tag in TARGETS else platform.machine().lower()
     if not wide or not machine.endswith(("x86_64", "amd64")):

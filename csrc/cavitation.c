@@ -133,8 +133,14 @@ Lift cavitation_lift(const FilmScale *film, double gap, double bound, double a, 
     };
 }
 
-EXPORT void lift_of_cavitation(const double *gap, const double *bend, const double *opening, const double *entrainment,
-                               double viscosity, double bound, double *out, int64_t count) {
+/* Fill what the bound of the pressure adds to the forces of line contacts, per length, N/m.
+ *
+ * gap: smallest gaps h0, m; bend: R' of the gaps h0 + x^2/(2 R'), m; opening: V = dh0/dt, m/s; entrainment: u, mean
+ * velocity of both surfaces as seen from the contact line, m/s; viscosity: Pa s; bound: p_c, the pressure is not below
+ * -p_c, Pa; out: force that opens the gap, force that works on u, their derivatives in V, and in u. */
+EXPORT void lift_of_cavitation(const double *gap /* (count) */, const double *bend /* (count) */,
+                               const double *opening /* (count) */, const double *entrainment /* (count) */,
+                               double viscosity, double bound, double *out /* (count, 6) */, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
         const FilmScale film = film_scale(gap[n], bend[n], viscosity, bound);
         const double a = film.per_u * entrainment[n], b = film.per_v * opening[n];

@@ -25,7 +25,15 @@ static int32_t blurred(const uint8_t *upper, const uint8_t *lower, int64_t left,
     return upper[left] + lower[left] + 2 * (upper[here] + lower[here]) + upper[here + 3] + lower[here + 3];
 }
 
-EXPORT void film_colours(const uint8_t *image, uint8_t *out, int64_t height, int64_t width, int64_t rows) {
+/* Luma, and chroma at half the size, of a picture: 8-bit YUV 4:2:0 of BT.709 in the limited range.
+ *
+ * A sample of chroma lies on an even column between two rows, where H.264 takes it to lie unless told otherwise. It is
+ * the mean of the two rows, with weights of 1/4, 1/2, 1/4 along them.
+ *
+ * image: sRGB bytes; height and width are even; out: bytes, rows = 3 height / 2: luma, then both parts of chroma row by
+ * row. */
+EXPORT void film_colours(const uint8_t *image /* (height, width, 3) */, uint8_t *out /* (rows, width) */,
+                         int64_t height, int64_t width, int64_t rows) {
     const int64_t half = width / 2, parts = rows - height; /* rows of both parts of chroma, (2, height/2, width/2) */
     uint8_t *chroma = out + height * width;
     for (int64_t i = 0; i < height * width; i++) {

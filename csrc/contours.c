@@ -18,8 +18,14 @@ static void lens_basis(const double pose[3], const double reach[2], double basis
         for (int j = 0; j < ACROSS; j++) basis[i][j] = cos(i * turn_a) * cos(j * turn_b);
 }
 
-EXPORT void edge_points(const double pose[3], const double *factors, const double (*normals)[2], const double reach[2],
-                        double (*points)[2], int64_t count) {
+/* Edge points in the plane through the axis, in the body's frame.
+ *
+ * pose: x, y, heading; factors: Chebyshev coefficients, in the lens's place along and across, of x and y with the upper
+ * rims of flat ends, and of x and y with the lower ones; the outer point of the two is taken; normals: outward normals;
+ * reach: largest distances of the lens along and across, m; points: the points, m. */
+EXPORT void edge_points(const double pose[3], const double *factors /* (8, 5, 4, count) */,
+                        const double (*normals)[2] /* (count, 2) */, const double reach[2],
+                        double (*points)[2] /* (count, 2) */, int64_t count) {
     double basis[ALONG][ACROSS], both[4][BLOCK];
     lens_basis(pose, reach, basis);
     for (int64_t first = 0; first < count; first += BLOCK) {
@@ -38,9 +44,17 @@ EXPORT void edge_points(const double pose[3], const double *factors, const doubl
     }
 }
 
-EXPORT void edge_places(const double pose[3], const double *factors, const double (*normals)[2], const double reach[2],
-                        double axis_height, const Camera *camera, double (*pixels)[2], double (*directions)[2],
-                        double *size, double (*slopes)[3], int64_t count) {
+/* Project a body's apparent contour into the picture.
+ *
+ * pose: x, y, heading; factors: coefficients of the edge points, as in `edge_points`; normals: outward normals in the
+ * body's frame; reach: largest distances of the lens along and across, m; axis_height: height of the axis, m; camera:
+ * packed, see `kernels.pictures`; pixels: the edge points; directions: unit normals in the picture; size: pixels per m
+ * along them; slopes: Jacobian of the displacement along each normal by (x, y, heading), pixels per m and per rad. */
+EXPORT void edge_places(const double pose[3], const double *factors /* (8, 5, 4, count) */,
+                        const double (*normals)[2] /* (count, 2) */, const double reach[2], double axis_height,
+                        const Camera *camera /* (17) */, double (*pixels)[2] /* (count, 2) */,
+                        double (*directions)[2] /* (count, 2) */, double *size /* (count) */,
+                        double (*slopes)[3] /* (count, 3) */, int64_t count) {
     const double c = cos(pose[2]), s = sin(pose[2]), step = 1e-4; /* m */
     double share = 0.0;
     edge_points(pose, factors, normals, reach, pixels, count);

@@ -234,8 +234,7 @@ double balance_rates(Balance *b, double q[RATES], double left[RATES]) {
         set_tangent(b, duals, q, h);
         find_step(b, h, left, step);
         for (int i = 0; i < RATES; i++) q[i] += step[i];
-        if (b->prescribed)
-            size = residual(b, q, left); /* for the torque */
+        if (b->prescribed) size = residual(b, q, left); /* for the torque */
         for (int k = 0; k < FILMS && !b->prescribed; k++)
             if (b->slices[k]) follow_lifts(b->slices[k], step);
         return size / scale;
@@ -251,8 +250,13 @@ double balance_rates(Balance *b, double q[RATES], double left[RATES]) {
     return size / scale;
 }
 
-EXPORT double balanced(const double *a, const double *force, const double *loads, const double *rows, double slow,
-                       double *q, double *left, int64_t count) {
+/* Find the rates q at which A q and dry friction balance the force; return the rest of the forces, over them.
+ *
+ * a: A; force: f; loads: mu_c N_c, at most 32; rows: J_c, sliding velocities along the tube and around it per rate;
+ * slow: v_r, m/s; q: first guess, and the result; left: remaining forces. */
+EXPORT double balanced(const double *a /* (7, 7) */, const double *force /* (7) */, const double *loads /* (count) */,
+                       const double *rows /* (count, 2, 7) */, double slow, double *q /* (7) */, double *left /* (7) */,
+                       int64_t count) {
     Balance balance = {.count = count, .slow = slow, .along = JOINT};
     for (int i = 0; i < RATES; i++) {
         balance.force[i] = force[i];

@@ -38,9 +38,14 @@ static inline void values_at(const Place *p, int64_t channels, int64_t below, do
     }
 }
 
-EXPORT void profiles_across(const float *picture, const double origin[2], const double (*pixels)[2],
-                            const double (*normals)[2], const double *offsets, double *profiles, int64_t height,
-                            int64_t width, int64_t channels, int64_t count, int64_t length) {
+/* Brightness profiles along the normals of edge points, by cubic convolution; NaN outside of the region.
+ *
+ * picture: brightness, or colours, of a region of the picture; origin: pixel (u, v) of the region's upper left corner;
+ * pixels: the edge points; normals: unit directions; offsets: distances along them, pixels; profiles: the profiles. */
+EXPORT void profiles_across(const float *picture /* (height, width, channels) */, const double origin[2],
+                            const double (*pixels)[2] /* (count, 2) */, const double (*normals)[2] /* (count, 2) */,
+                            const double *offsets /* (length) */, double *profiles /* (channels, count, length) */,
+                            int64_t height, int64_t width, int64_t channels, int64_t count, int64_t length) {
     const double last_u = (double)width - 2.0, last_v = (double)height - 2.0;
     for (int64_t i = 0; i < count; i++) {
         for (int64_t k = 0; k < length; k++) {
@@ -76,8 +81,19 @@ static Trend trend_of(const double *values, int64_t length) {
     return (Trend){sum / size, moment / spread};
 }
 
-EXPORT void shifts_of_profiles(const double *profiles, const double *templates, const double *slopes, double *shifts,
-                               double *strengths, double *residuals, int64_t count, int64_t length) {
+/* Displacement d of each edge along its normal: q(s) = b + c s + a (p(s) - d p'(s)) by least squares.
+ *
+ * Offset b, slope c and contrast a of either sign are free at every point, so that lamp, shadows and the colour of a
+ * stripe do not bias the displacement.
+ *
+ * profiles: brightness q; templates: template p of the undisplaced edge, without mean and slope; slopes: derivative p'
+ * of the template, per sample; shifts: d, samples; NaN where the fit is singular; strengths: a; residuals: root mean
+ * square residual. */
+EXPORT void shifts_of_profiles(const double *profiles /* (count, length) */,
+                               const double *templates /* (count, length) */,
+                               const double *slopes /* (count, length) */, double *shifts /* (count) */,
+                               double *strengths /* (count) */, double *residuals /* (count) */, int64_t count,
+                               int64_t length) {
     const double half = 0.5 * ((double)length - 1.0);
     for (int64_t i = 0; i < count; i++) {
         const double *profile = profiles + i * length, *template = templates + i * length, *slope = slopes + i * length;
@@ -123,10 +139,23 @@ static double score_at(const double *sums, const double *seen, const double all_
     return score;
 }
 
-/* The innermost loops run down the columns of all places, so that they vectorise. */
-EXPORT void edge_scores(const double *slope_u, const double *slope_v, const double (*pixels)[2],
-                        const double (*normals)[2], const int64_t *group, double first_u, double first_v, double *work,
-                        double *scores, int64_t width, int64_t height, int64_t count, int64_t rows, int64_t columns) {
+/* Edge scores of a shape at a grid of places in a picture.
+ *
+ * The score of a group of edges is its mean gradient along the normals: signed over a few neighbouring points, which
+ * cancels noise and clutter, then in magnitude. The total is the geometric mean of the first four groups (both ends,
+ * both sides), so that none can replace another, plus a share of the fifth.
+ *
+ * slope_u: brightness gradient along u, transposed; slope_v: brightness gradient along v, transposed; pixels: edge
+ * points of the shape; normals: their unit normals; group: index of the group of each point, 0 to 4; first_u: shift of
+ * the shape to the first place along u, pixels; first_v: along v; scores: the scores at shifts by whole columns and
+ * rows from the first place; 0 where more than half of a group is outside.
+ *
+ * The innermost loops run down the columns of all places, so that they vectorise. */
+EXPORT void edge_scores(const double *slope_u /* (width, height) */, const double *slope_v /* (width, height) */,
+                        const double (*pixels)[2] /* (count, 2) */, const double (*normals)[2] /* (count, 2) */,
+                        const int64_t *group /* (count) */, double first_u, double first_v,
+                        double *work /* (2, 5, rows) */, double *scores /* (columns, rows) */, int64_t width,
+                        int64_t height, int64_t count, int64_t rows, int64_t columns) {
     double all_of[GROUPS] = {0.0}, *restrict sums = work, *restrict seen = work + GROUPS * rows;
     for (int64_t i = 0; i < count; i++) all_of[group[i]] += 1.0;
     for (int64_t c = 0; c < columns; c++) {
@@ -221,8 +250,15 @@ static double median(double *values, int64_t count) {
     return 0.5 * (lower + upper);
 }
 
-EXPORT double robust_change(const double *shifts, const double (*slopes)[3], const double *weights, double *work,
-                            double *used, double change[3], int64_t count) {
+/* Robust least squares of a pose change, by reweighting with Tukey's biweight.
+ *
+ * Returns The residual scale over the expected one, at least 1/2.
+ *
+ * shifts: displacement of each edge along its normal, pixels; slopes: Jacobian of the displacements; weights: inverse
+ * variances, 0 for invalid edges; used: the final weights, 0 for outliers; change: the pose change. */
+EXPORT double robust_change(const double *shifts /* (count) */, const double (*slopes)[3] /* (count, 3) */,
+                            const double *weights /* (count) */, double *work /* (2, count) */,
+                            double *used /* (count) */, double change[3], int64_t count) {
     const double mad_to_sigma = 1.4826; /* of a normal distribution, 1/Phi^-1(3/4) */
     double size[3] = {1e-300, 1e-300, 1e-300}, level = 1.0, *misses = work, *known = work + count;
     for (int64_t i = 0; i < count; i++) {
@@ -247,8 +283,13 @@ EXPORT double robust_change(const double *shifts, const double (*slopes)[3], con
     return level;
 }
 
-EXPORT void sums_along(const double *rows, const double (*design)[4], double middle, const double (*trials)[4],
-                       double *sums, int64_t count, int64_t length, int64_t tried) {
+/* Sums of one sample from each row, at positions linear in four parameters; 0 beyond the rows' ends.
+ *
+ * rows: samples; design: Jacobian of the position in each row, samples; middle: position where all parameters are zero,
+ * samples; trials: the trial parameters; sums: the sums. */
+EXPORT void sums_along(const double *rows /* (count, length) */, const double (*design)[4] /* (count, 4) */,
+                       double middle, const double (*trials)[4] /* (tried, 4) */, double *sums /* (tried) */,
+                       int64_t count, int64_t length, int64_t tried) {
     for (int64_t q = 0; q < tried; q++) {
         double total = 0.0;
         for (int64_t i = 0; i < count; i++) {

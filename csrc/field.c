@@ -4,9 +4,14 @@
  */
 #include "panels.h"
 
-/* Regularised Stokeslets; p = (x.f)(2 r^2 + 3 e^2)/r^5 (Cortez, SIAM J. Sci. Comput. 23:1204, 2001). */
-EXPORT void add_blobs(const double *points, const double *sources, const double *forces, const double *e2,
-                      double *field, int64_t n, int64_t count) {
+/* Add the flow of regularised Stokeslets to `field`, velocity and pressure; e2 are squares of the blob radii.
+ *
+ * p = (x.f)(2 r^2 + 3 e^2)/r^5 (Cortez, SIAM J. Sci. Comput. 23:1204, 2001).
+ *
+ * Threads share n. */
+EXPORT void add_blobs(const double *points /* (n, 3) */, const double *sources /* (count, 3) */,
+                      const double *forces /* (count, 3) */, const double *e2 /* (count) */, double *field /* (n, 4) */,
+                      int64_t n, int64_t count) {
     for (int64_t i = 0; i < n; i++) {
         const double *at = points + 3 * i;
         double u = field[4 * i], v = field[4 * i + 1], w = field[4 * i + 2], pressure = field[4 * i + 3];
@@ -27,9 +32,13 @@ EXPORT void add_blobs(const double *points, const double *sources, const double 
     }
 }
 
-/* First moments m of forces, trace-free, force by displacement: u_a = -m[b, k] d_k G[a, b], and its pressure. */
-EXPORT void add_moments(const double *points, const double *sources, const double *moments, const double *e2,
-                        double *field, int64_t n, int64_t count) {
+/* Add the flow of first moments m of forces, trace-free, force by displacement: u_a = -m[b, k] d_k G[a, b], and its
+ * pressure; e2 are squares of the blob radii.
+ *
+ * Threads share n. */
+EXPORT void add_moments(const double *points /* (n, 3) */, const double *sources /* (count, 3) */,
+                        const double *moments /* (count, 3, 3) */, const double *e2 /* (count) */,
+                        double *field /* (n, 4) */, int64_t n, int64_t count) {
     for (int64_t i = 0; i < n; i++) {
         double *out = field + 4 * i;
         for (int64_t j = 0; j < count; j++) {
@@ -120,11 +129,20 @@ static void add_rings(const void *context, PanelPoints *points) {
     }
 }
 
-/* Single layer on panels: complex modes (f_x, f_rho, g) ds/du on the nodes, (panels, nodes, modes, 3). */
-EXPORT void add_layer(const double *points, const double *x_p, const double *rho_p, const Amplitude *density,
-                      const double *nodes, const double *barycentric, const double *fine, const double *fine_weights,
-                      const double *weights, double *field, int64_t n, int64_t panels, int64_t size, int64_t modes,
-                      int64_t fine_size) {
+/* Add the flow of a single layer on panels.
+ *
+ * points: where; x_p: nodes of the panels; rho_p: nodes of the panels; density: complex modes (f_x, f_rho, g) ds/du on
+ * the nodes; nodes: on [-1, 1]; barycentric: weights of the nodes; fine: abscissas of a finer Gauss rule, for panels
+ * near a point; fine_weights: their weights; weights: Gauss weights of the nodes; field: velocity and pressure to add
+ * to.
+ *
+ * Threads share n. */
+EXPORT void add_layer(const double *points /* (n, 3) */, const double *x_p /* (panels, size) */,
+                      const double *rho_p /* (panels, size) */, const Amplitude *density /* (panels, size, modes, 3) */,
+                      const double *nodes /* (size) */, const double *barycentric /* (size) */,
+                      const double *fine /* (fine_size) */, const double *fine_weights /* (fine_size) */,
+                      const double *weights /* (size) */, double *field /* (n, 4) */, int64_t n, int64_t panels,
+                      int64_t size, int64_t modes, int64_t fine_size) {
     const PanelRule rule = {size, nodes, barycentric, weights, fine_size, fine, fine_weights};
     Amplitude turns[modes];
     for (int64_t i = 0; i < n; i++) {

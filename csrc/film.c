@@ -239,30 +239,50 @@ void film_resistance(const Film *f, double e, double pitch, double yaw, double o
     multiply_factors(sums, f->body, c.turn, out);
 }
 
-EXPORT double film_at(const double *packed, double e, double pitch, double yaw, double *out) {
+/* Write the film's resistance (6x6, per viscosity, in F about the body's middle); the body's smallest gap, m.
+ *
+ * Outside of the table the film goes on: as power laws below its thinnest clearances, unchanged beyond its largest yaw.
+ * Where the body touches the wall, the clearances are 1e-12 of its radius, and the gap is negative.
+ *
+ * packed: a film's table, packed; e: offset of the body's middle from the tube's axis, m, at least 0; pitch: pitch,
+ * rad, positive where the nose points away from the wall; yaw: yaw, rad; out: (6, 6), the result. */
+EXPORT double film_at(const double *packed /* (...) */, double e, double pitch, double yaw, double *out /* (6, 6) */) {
     const Film film = film_opened(packed);
     film_resistance(&film, e, pitch, yaw, (double (*)[6])out);
     return film_smallest_gap(&film, e, pitch, yaw);
 }
 
-EXPORT double smallest_gap(const double *head, double e, double pitch, double yaw) {
+/* Smallest distance between a body and the wall, m; `head` may be a packed table. */
+EXPORT double smallest_gap(const double *head /* (...) */, double e, double pitch, double yaw) {
     const Film film = film_opened(head);
     return film_smallest_gap(&film, e, pitch, yaw);
 }
 
-EXPORT double clearance(const double *head, double x, double half, double ring, double rounded, double e, double lift,
-                        double side) {
+/* Depth by which a ring, or a spheroid, may sink until it touches the wall, m.
+ *
+ * head: head of a packed table; x: place on the body's axis; half: half-length of the spheroid, 0 for a ring; ring:
+ * radius of the ring or spheroid; rounded: radius of the ball that runs around on the ring; e: offset of the body's
+ * middle; lift: component of the body's axis towards the tube's axis; side: component of the body's axis to the side. */
+EXPORT double clearance(const double *head /* (...) */, double x, double half, double ring, double rounded, double e,
+                        double lift, double side) {
     return clearance_of(head[0], (Part){x, half, ring, rounded}, e, (Axis){lift, side});
 }
 
+/* Coordinate of a clearance: its logarithm where it is small against the radius, and finer about the radius. */
 EXPORT double stretched(double v, double radius) { return stretched_clearance(v, radius); }
 
-EXPORT double yaw_scale(const double *head, double rear, double front) {
+/* Sine of the yaw at which the wall's curvature under the straight side counts, from the clearances of its ends. */
+EXPORT double yaw_scale(const double *head /* (...) */, double rear, double front) {
     const Film film = film_opened(head);
     return yaw_scale_of(&film, rear, front);
 }
 
-EXPORT void film_coordinates(const double *head, double e, double pitch, double yaw, double *out) {
+/* Write what the interpolation of a film goes by at a place; `head` may be a packed table.
+ *
+ * Three coordinates; the part of log D of the first motion that is known in closed form; and the angle from z' to the
+ * normal of the wall, where a rounded end is nearest. */
+EXPORT void film_coordinates(const double *head /* (...) */, double e, double pitch, double yaw,
+                             double *out /* (5) */) {
     const Film film = film_opened(head);
     const Coordinates c = coordinates_of(&film, e, pitch, yaw);
     out[0] = c.first;
@@ -272,6 +292,7 @@ EXPORT void film_coordinates(const double *head, double e, double pitch, double 
     out[4] = c.turn;
 }
 
-EXPORT int64_t spline_weights(double at, double first, double last, int64_t intervals, double *out) {
+/* Weights of the four cubic B-splines at a place, and the number of their first; a straight line outside. */
+EXPORT int64_t spline_weights(double at, double first, double last, int64_t intervals, double *out /* (4) */) {
     return spline_weights_at(at, first, last, intervals, out);
 }

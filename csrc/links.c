@@ -31,11 +31,11 @@ void weight_loads(const Weight *weight, double phase, const double rotation[3][3
     force[6] = rotor_y * down[2] - rotor_z * down[1];
 }
 
-/* The field in the lab at a time, T: it turns about its axis n, at right angles to it.
+/* The field in the lab at a time, s, in T: it turns about its axis n, at right angles to it.
  *
  * About x it is b = B (0, -sin a, cos a), a = rate t + phase, up at a = 0. The least rotation that takes x to n takes
  * it to b - n.b (x + n)/(1 + n_x). */
-EXPORT void field_at(double time, const double *packed, double *out) {
+EXPORT void field_at(double time, const double *packed /* (48) */, double *out /* (3) */) {
     const Drive *drive = (const Drive *)packed;
     const double angle = drive->field_rate * time + drive->field_phase;
     const double along = -drive->field * sin(angle), up = drive->field * cos(angle);
@@ -77,7 +77,8 @@ void assemble(const double fluid[RATES][RATES], const Links *links, double a[RAT
 double drive_torque(const Drive *drive, double current, const double free[RATES], const double per_torque[RATES]) {
     const double sense = drive->motor.polarity;
     if (drive->kind == MOTOR) return sense * drive->motor.torque_constant * current;
-    if (drive->kind == CURVE) return sense * curve_torque(&drive->curve, drive->duty, sense * free[JOINT], per_torque[JOINT]);
+    if (drive->kind == CURVE)
+        return sense * curve_torque(&drive->curve, drive->duty, sense * free[JOINT], per_torque[JOINT]);
     if (drive->kind == TORQUE) return drive->duty * drive->given;
     if (drive->kind == RATE && drive->duty > 0.0)
         return (drive->given - free[SPIN] - free[JOINT]) / (per_torque[SPIN] + per_torque[JOINT]);

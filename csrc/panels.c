@@ -160,12 +160,22 @@ static void add_to_block(const void *context, PanelPoints *points) {
     }
 }
 
-/* Velocities of every mode at rings, from a single layer on the panels of outlines, (modes, targets, 3, panels, nodes,
- * 3), for densities times the length of du. `own` is the index of the node that a target is, else -1. */
-EXPORT void layer_blocks(const double *x, const double *rho, const int64_t *own, const double *x_p, const double *rho_p,
-                         double e2, const double *nodes, const double *barycentric, const double *fine,
-                         const double *fine_weights, const double *weights, double *blocks, int64_t targets,
-                         int64_t panels, int64_t size, int64_t fine_size, int64_t modes) {
+/* Fill the velocities of every mode at rings, from a single layer on the panels of outlines.
+ *
+ * The density is interpolated between the panel's nodes and multiplied by the length of du, so that the integrals are
+ * over rho du.
+ *
+ * x: targets; rho: targets; own: index of the node that a target is, panel by panel; -1 for a target off the outline;
+ * x_p: nodes of the panels; rho_p: nodes of the panels; e2: square of the blob radius; nodes: on [-1, 1]; barycentric:
+ * weights of the nodes; fine: abscissas of a finer Gauss rule, for panels near a target; fine_weights: their weights;
+ * weights: Gauss weights of the nodes. */
+EXPORT void layer_blocks(const double *x /* (targets) */, const double *rho /* (targets) */,
+                         const int64_t *own /* (targets) */, const double *x_p /* (panels, size) */,
+                         const double *rho_p /* (panels, size) */, double e2, const double *nodes /* (size) */,
+                         const double *barycentric /* (size) */, const double *fine /* (fine_size) */,
+                         const double *fine_weights /* (fine_size) */, const double *weights /* (size) */,
+                         double *blocks /* (modes, targets, 3, panels, size, 3) */, int64_t targets, int64_t panels,
+                         int64_t size, int64_t fine_size, int64_t modes) {
     const PanelRule rule = {size, nodes, barycentric, weights, fine_size, fine, fine_weights};
     const int64_t row = 3 * panels * size;
     memset(blocks, 0, (size_t)(modes * targets * 3 * row) * sizeof *blocks);

@@ -17,8 +17,9 @@ static void sample(const uint8_t *image, int64_t height, int64_t width, double u
     }
 }
 
-EXPORT void sampled(const uint8_t *image, const double (*pixels)[2], double (*colours)[3], int64_t height,
-                    int64_t width, int64_t count) {
+/* Colours of a picture at pixels (u, v), by bilinear interpolation; NaN outside. */
+EXPORT void sampled(const uint8_t *image /* (height, width, 3) */, const double (*pixels)[2] /* (count, 2) */,
+                    double (*colours)[3] /* (count, 3) */, int64_t height, int64_t width, int64_t count) {
     for (int64_t k = 0; k < count; k++) sample(image, height, width, pixels[k][0], pixels[k][1], colours[k]);
 }
 
@@ -29,8 +30,14 @@ static void insert(double *series, int64_t count, double value) {
     series[k] = value;
 }
 
-EXPORT void profile_of_rows(const uint8_t *image, const double (*first)[2], const double (*last)[2], double *work,
-                            double (*colours)[3], int64_t height, int64_t width, int64_t count, int64_t rows) {
+/* Interquartile mean of the colours on lines between pixels, which rejects highlights and bubbles.
+ *
+ * image: the picture; first: start of each line, pixels; last: end of each line, pixels; work: memory, for as many
+ * samples as a line has; colours: the colours; NaN where fewer than half of the samples lie in the picture. */
+EXPORT void profile_of_rows(const uint8_t *image /* (height, width, 3) */, const double (*first)[2] /* (count, 2) */,
+                            const double (*last)[2] /* (count, 2) */, double *work /* (3, rows) */,
+                            double (*colours)[3] /* (count, 3) */, int64_t height, int64_t width, int64_t count,
+                            int64_t rows) {
     for (int64_t n = 0; n < count; n++) {
         int64_t seen = 0;
         for (int64_t m = 0; m < rows; m++) {
@@ -73,9 +80,13 @@ static void stripe_colour(const Pattern *p, double angle, double blur, double ro
     for (int c = 0; c < 3; c++) colour[c] = one[c] * (1.0 - before) + two[c] * (before - after) + three[c] * after;
 }
 
-EXPORT void stripes_at(const double *angles, const double *blur, double roll, const int64_t *order,
-                       const double (*palette)[3], double (*colours)[3], int64_t count, int64_t stripes,
-                       int64_t classes) {
+/* Colours of blurred stripes at angles about the axis, for the body's rotation angle `roll`.
+ *
+ * angles: angles about the axis, rad; blur: standard deviation of the blur at each angle, rad; roll: angle of the first
+ * stripe's middle, rad; order: class of each stripe; palette: colour of each class; colours: the colours. */
+EXPORT void stripes_at(const double *angles /* (count) */, const double *blur /* (count) */, double roll,
+                       const int64_t *order /* (stripes) */, const double (*palette)[3] /* (classes, 3) */,
+                       double (*colours)[3] /* (count, 3) */, int64_t count, int64_t stripes, int64_t classes) {
     const Pattern pattern = {order, palette, stripes, classes};
     for (int64_t n = 0; n < count; n++) stripe_colour(&pattern, angles[n], blur[n], roll, colours[n]);
 }
@@ -247,9 +258,20 @@ static double distant_loss(const double *losses, int64_t tries, int64_t best, in
     return least;
 }
 
-EXPORT void stripe_fit(const double (*profile)[3], const double *scale, const double *trust, const double *angles,
-                       const double (*shade)[6], const int64_t *order, const double (*palette)[3], double period,
-                       double tint, double cut, double usual, double blur, double *work, double *losses,
+/* Fit the rotation angle of stripes to a colour profile: grid search, then robust Gauss-Newton steps.
+ *
+ * profile: colours along the angle; NaN where invisible; scale: pixels per radian at each angle; trust: weight of each
+ * angle, beside that of its scale; angles: angles about the axis, rad; shade: shading factor and additive sheen at each
+ * angle, in each channel; order: class of each stripe; palette: colour of each class; period: of the pattern, rad;
+ * tint: strength of the prior on the channels' common gain; cut: residual beyond which a sample is an outlier; usual:
+ * least expected residual; blur: standard deviation of the blur, pixels; losses: loss at each angle of the grid, 0 to
+ * 1; answer: angle, its standard error, loss, least loss at a distant angle, loss of a uniform colour, gains of the
+ * channels; unchanged where too little is visible. */
+EXPORT void stripe_fit(const double (*profile)[3] /* (count, 3) */, const double *scale /* (count) */,
+                       const double *trust /* (count) */, const double *angles /* (count) */,
+                       const double (*shade)[6] /* (count, 6) */, const int64_t *order /* (stripes) */,
+                       const double (*palette)[3] /* (classes, 3) */, double period, double tint, double cut,
+                       double usual, double blur, double *work /* (count, 17) */, double *losses /* (tries) */,
                        double answer[8], int64_t count, int64_t stripes, int64_t classes, int64_t tries) {
     const Pattern pattern = {order, palette, stripes, classes};
     const Profile all = {(Sample *)work, count, 1};

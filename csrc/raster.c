@@ -16,9 +16,17 @@ _Static_assert(sizeof(Material) == 4 * sizeof(double), "the layout of a packed m
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-EXPORT void shade(const double (*normals)[3], const double turn[3][3], const double (*towards)[3],
-                  const double (*halfway)[3], const double *strength, const Material *materials, const int64_t *kind,
-                  double *diffuse, double *specular, int64_t triangles, int64_t lamps, int64_t kinds) {
+/* Light that corners of triangles send to a camera far above them (Blinn-Phong).
+ *
+ * normals: unit normals in the frame of their solid; turn: rotation of the solid; towards: unit vector towards each
+ * lamp; halfway: unit vector halfway between lamp and camera; strength: of each lamp; materials: ambient, diffuse and
+ * specular reflectance, and exponent of the specular one; kind: index of each triangle's material; diffuse: diffuse
+ * light of each corner; specular: specular light of each corner. */
+EXPORT void shade(const double (*normals)[3] /* (triangles, 3, 3) */, const double turn[3][3],
+                  const double (*towards)[3] /* (lamps, 3) */, const double (*halfway)[3] /* (lamps, 3) */,
+                  const double *strength /* (lamps) */, const Material *materials /* (kinds, 4) */,
+                  const int64_t *kind /* (triangles) */, double *diffuse /* (triangles, 3) */,
+                  double *specular /* (triangles, 3) */, int64_t triangles, int64_t lamps, int64_t kinds) {
     (void)kinds;
     for (int64_t i = 0; i < 3 * triangles; i++) {
         const Material material = materials[kind[i / 3]];
@@ -140,11 +148,20 @@ static void draw_triangle(const Window *w, const Spots *spots, const double *cor
     }
 }
 
-EXPORT void draw(const double (*seen)[3], const int64_t (*faces)[3], const double (*colour)[3],
-                 const double (*gloss)[3], const double (*diffuse)[3], const double (*specular)[3],
-                 const double spots[16][2][SAMPLES], int64_t first, int64_t every, int64_t left, int64_t top,
-                 float *depth, float (*picture)[3], int64_t vertices, int64_t triangles, int64_t rows,
-                 int64_t columns) {
+/* Draw triangles that face the camera into samples, the highest in front.
+ *
+ * seen: pixel u, v and height z of each vertex; faces: vertices of each triangle, outward oriented; colour: linear
+ * colour of each triangle's diffuse light; gloss: linear colour of its specular light; diffuse: diffuse light of its
+ * corners; specular: specular light of its corners; spots: u and v of the samples in a pixel, -0.5 to 0.5, for 4 x 4
+ * neighbouring pixels; first: number of the first sample that is drawn; every: every how many samples one is drawn from
+ * there: those of one moment; left: column of the picture's first pixel; top: row of the picture's first pixel; depth:
+ * height z of what each sample has met; picture: its colour. */
+EXPORT void draw(const double (*seen)[3] /* (vertices, 3) */, const int64_t (*faces)[3] /* (triangles, 3) */,
+                 const double (*colour)[3] /* (triangles, 3) */, const double (*gloss)[3] /* (triangles, 3) */,
+                 const double (*diffuse)[3] /* (triangles, 3) */, const double (*specular)[3] /* (triangles, 3) */,
+                 const double spots[16][2][SAMPLES] /* (16, 2, 16) */, int64_t first, int64_t every, int64_t left,
+                 int64_t top, float *depth /* (rows, columns, 16) */, float (*picture)[3] /* (rows, columns, 16, 3) */,
+                 int64_t vertices, int64_t triangles, int64_t rows, int64_t columns) {
     (void)vertices;
     const Window window = {left, top, rows, columns, depth, picture};
     const Spots chosen = spots_of(spots, first, every);
@@ -171,9 +188,20 @@ static double lit(const Shadow *s, double x, double y) {
     return 1.0 - s->darkness / (1.0 + exp(smaller(far / s->softness, 50.0)));
 }
 
-EXPORT void blend(float *depth, const float (*samples)[3], int64_t left, int64_t top, const float *over,
-                  const float *shine, const float (*floors)[2], const Shadow *shadow, const double tint[3],
-                  float (*picture)[3], int64_t rows, int64_t columns, int64_t whole_rows, int64_t whole_columns) {
+/* Composite the samples of an exposure and the robot's shadow with the still parts, and clear the samples.
+ *
+ * depth: height of what each sample has met; cleared; samples: colours of the samples; left: column of the whole
+ * picture at which the samples begin; top: row at which they begin; over: transmission of the glass between robot and
+ * camera; shine: light mirrored by the glass; floors: x and y of the floor behind each pixel, m; shadow: of the robot
+ * on the floor, a rounded bar: its centre, unit vector along it, half length without the rounded ends, radius, width of
+ * its edge, m, and relative loss of light; tint: transmission of red, green and blue by the oil; picture: light of the
+ * still parts; changed. */
+EXPORT void blend(float *depth /* (rows, columns, 16) */, const float (*samples)[3] /* (rows, columns, 16, 3) */,
+                  int64_t left, int64_t top, const float *over /* (whole_rows, whole_columns) */,
+                  const float *shine /* (whole_rows, whole_columns) */,
+                  const float (*floors)[2] /* (whole_rows, whole_columns, 2) */, const Shadow *shadow /* (8) */,
+                  const double tint[3], float (*picture)[3] /* (whole_rows, whole_columns, 3) */, int64_t rows,
+                  int64_t columns, int64_t whole_rows, int64_t whole_columns) {
     (void)whole_rows;
     for (int64_t cell = 0; cell < rows * columns; cell++) {
         const int64_t pixel = (top + cell / columns) * whole_columns + left + cell % columns;
@@ -193,9 +221,15 @@ EXPORT void blend(float *depth, const float (*samples)[3], int64_t left, int64_t
     }
 }
 
-EXPORT void develop(const float *light, const double *lens, const double gain[3], const double *curve,
-                    const float *grain, const int64_t *starts, double sigma, uint8_t *restrict image, int64_t rows,
-                    int64_t columns, int64_t steps, int64_t grains) {
+/* Bytes of a picture from its light: vignetting, lamp, gamma curve, noise.
+ *
+ * light: linear light; lens: transmission of the lens; gain: brightness of the lamp; curve: bytes over linear light
+ * from 0 to 1 in equal steps; grain: a pool of standard normal noise; starts: start of each row in it; sigma: standard
+ * deviation of the noise, bytes; image: the picture. */
+EXPORT void develop(const float *light /* (rows, columns, 3) */, const double *lens /* (rows, columns) */,
+                    const double gain[3], const double *curve /* (steps) */, const float *grain /* (grains) */,
+                    const int64_t *starts /* (rows) */, double sigma, uint8_t *restrict image /* (rows, columns, 3) */,
+                    int64_t rows, int64_t columns, int64_t steps, int64_t grains) {
     const double last = (double)steps - 1.0;
     for (int64_t v = 0; v < rows; v++) {
         int64_t at = starts[v];

@@ -140,9 +140,13 @@ void fill_ring_mode(const RingPairs *r, int64_t m, double (*a)[LANES], double (*
     }
 }
 
-/* A_n and B_n of one pair of rings, at least 2. */
-EXPORT void ring_integrals(double dx, double delta, double rho, double rho_s, double e2, double *a, double *b,
-                           int64_t count) {
+/* Fill a[n] = int cos(n phi)/r dphi and b[n] = int cos(n phi)/r^3 dphi.
+ *
+ * dx: axial distance of the rings; delta: rho - rho_s, known better than the difference where the rings are close; rho:
+ * radius of one ring, above 0; rho_s: radius of the other, above 0; e2: square of the blob radius; rings that coincide
+ * need one; a: at least 2. */
+EXPORT void ring_integrals(double dx, double delta, double rho, double rho_s, double e2, double *a /* (count) */,
+                           double *b /* (count) */, int64_t count) {
     double a_lanes[count][LANES], b_lanes[count][LANES];
     RingPairs pairs = {.e2 = e2};
     EACH_LANE {
@@ -158,9 +162,11 @@ EXPORT void ring_integrals(double dx, double delta, double rho, double rho_s, do
     }
 }
 
-/* Blocks between all rings of two sets, (modes, targets, 3, sources, 3). */
-EXPORT void ring_blocks(const double *x, const double *rho, const double *x_s, const double *rho_s, double e2,
-                        double *blocks, int64_t targets, int64_t sources, int64_t modes) {
+/* Fill the blocks between all rings of two sets, from the sources (x_s, rho_s) to the targets (x, rho). */
+EXPORT void ring_blocks(const double *x /* (targets) */, const double *rho /* (targets) */,
+                        const double *x_s /* (sources) */, const double *rho_s /* (sources) */, double e2,
+                        double *blocks /* (modes, targets, 3, sources, 3) */, int64_t targets, int64_t sources,
+                        int64_t modes) {
     double a[modes + 1][LANES], b[modes + 1][LANES], k[9][LANES];
     RingPairs pairs = {.e2 = e2};
     for (int64_t i = 0; i < targets; i++) {

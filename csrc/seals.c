@@ -118,10 +118,25 @@ static void add_share(const Profiles *p, int64_t edge, const double middle[COLOU
     }
 }
 
-EXPORT void seal_shares(const double *colours, const double *offsets, const int64_t (*sides)[3],
-                        const double (*palette)[COLOURS], const double (*ground)[COLOURS][COLOURS], double beside,
-                        double distinct, double white, int64_t fewest, int64_t pooled, double *work, double *share,
-                        double *distance, int64_t *kind, int64_t edges, int64_t samples, int64_t count, int64_t kinds) {
+/* Share of the stripe's colour in the samples across each edge of a seal.
+ *
+ * Colours are projected onto the direction that separates a stripe best from the surroundings of its side (Fisher's
+ * linear discriminant). At a silhouette of known colours the share is that of the colour of which there is most.
+ *
+ * colours: profiles across the edges, of 255; NaN out of view; offsets: distances of the samples outward from an edge,
+ * pixels; sides: first edge of each side, the one after its last, and whether the side is a silhouette; palette: known
+ * colours at the silhouette; none at first; ground: covariance of colours, by noise and by what lies farther out, at
+ * ends and at silhouettes, of 255; beside: distance from an edge from which on colours are those of one side, pixels;
+ * distinct: least distance of a stripe from its surroundings, standard deviations; white: brightness of glare, of 255,
+ * which hides an edge; fewest: fewest edges of a side in view; pooled: edges on either side whose surroundings are
+ * averaged; share: 1 in the stripe to 0 beside it; NaN where unknown; distance: squared distance of the stripe from its
+ * surroundings; 0 where they look alike; kind: index into the palette of the nearest colour; 0 without one. */
+EXPORT void seal_shares(const double *colours /* (3, edges, samples) */, const double *offsets /* (samples) */,
+                        const int64_t (*sides)[3] /* (count, 3) */, const double (*palette)[COLOURS] /* (kinds, 3) */,
+                        const double (*ground)[COLOURS][COLOURS] /* (2, 3, 3) */, double beside, double distinct,
+                        double white, int64_t fewest, int64_t pooled, double *work /* (2, 3, edges) */,
+                        double *share /* (edges, samples) */, double *distance /* (edges) */,
+                        int64_t *kind /* (edges) */, int64_t edges, int64_t samples, int64_t count, int64_t kinds) {
     const Profiles p = {colours, offsets, edges, samples, beside};
     double *middle = work + COLOURS * edges, inverse[COLOURS][COLOURS];
     for (int64_t i = 0; i < edges; i++) {
@@ -178,11 +193,23 @@ static double fit_template(const Template *t, const double *share, int64_t sampl
     return sqrt(misses / (double)(samples - t->first - 3));
 }
 
-EXPORT void seal_shifts(const double *share, const double *distance, const int64_t *kind, const int64_t (*sides)[3],
-                        const double *bias, const double (*design)[3], const double *inverses, const int64_t starts[2],
-                        double steepness, double largest, double weakest, double strongest, double noise,
-                        double *shifts, uint8_t *known, double *variance, int64_t edges, int64_t samples, int64_t count,
-                        int64_t kinds) {
+/* Displacement of each edge of a seal along its normal, by least squares of a template.
+ *
+ * share: share of the stripe's colour in the samples across each edge; distance: squared distance of the stripe from
+ * its surroundings; 0 where they look alike; kind: class of the colour at each edge; sides: first edge of each side,
+ * the one after its last, and whether the side is a silhouette; bias: displacement by each class of colour at each
+ * side, samples; design: the template's columns: level, the edge of contrast 1, its slope; inverses: their
+ * pseudoinverses, at other sides and at silhouettes; starts: first sample that is used at these; steepness: root sum
+ * square of the slope; largest: largest valid displacement, samples; weakest: least valid contrast; strongest: largest
+ * one; noise: least residual, times the distance; shifts: the displacements, samples; NaN out of view; known: 1 where
+ * the displacement is valid; variance: its variance, samples^2. */
+EXPORT void seal_shifts(const double *share /* (edges, samples) */, const double *distance /* (edges) */,
+                        const int64_t *kind /* (edges) */, const int64_t (*sides)[3] /* (count, 3) */,
+                        const double *bias /* (count, kinds) */, const double (*design)[3] /* (samples, 3) */,
+                        const double *inverses /* (2, 3, samples) */, const int64_t starts[2], double steepness,
+                        double largest, double weakest, double strongest, double noise, double *shifts /* (edges) */,
+                        uint8_t *known /* (edges) */, double *variance /* (edges) */, int64_t edges, int64_t samples,
+                        int64_t count, int64_t kinds) {
     for (int64_t i = 0; i < edges; i++) {
         shifts[i] = variance[i] = NAN;
         known[i] = 0;

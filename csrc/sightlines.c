@@ -37,7 +37,9 @@ static double crossing_of(const VirtualCamera *c, double across, double deep) {
     return r;
 }
 
-EXPORT void project(const double (*points)[3], const VirtualCamera *c, double (*seen)[3], int64_t count) {
+/* Pixel u, v and height z of points, by Snell's law; those above the surface are seen straight. */
+EXPORT void project(const double (*points)[3] /* (count, 3) */, const VirtualCamera *c /* (17) */,
+                    double (*seen)[3] /* (count, 3) */, int64_t count) {
     for (int64_t i = 0; i < count; i++) {
         double x = points[i][0], y = points[i][1], down = c->eye - points[i][2];
         if (points[i][2] < c->surface) {
@@ -91,7 +93,9 @@ static Ray sightline(const VirtualCamera *c, double u, double v) {
     return (Ray){x * down, y * down, dx, dy, -sqrt(1.0 - dx * dx - dy * dy)};
 }
 
-EXPORT void sightlines(const double (*pixels)[2], const VirtualCamera *camera, Ray *rays, int64_t count) {
+/* Lines of sight of pixels: x and y where they cross the surface, unit vector in the oil, away from the camera. */
+EXPORT void sightlines(const double (*pixels)[2] /* (count, 2) */, const VirtualCamera *camera /* (17) */,
+                       Ray *rays /* (count, 5) */, int64_t count) {
     for (int64_t i = 0; i < count; i++) rays[i] = sightline(camera, pixels[i][0], pixels[i][1]);
 }
 
@@ -152,10 +156,21 @@ static Print print_at(const Ruler *ruler, double x, double y) {
     return inked ? (Print){0.0, 1.0} : (Print){1.0, 0.0};
 }
 
-EXPORT void still_picture(const VirtualCamera *camera, const double *spots, const double colours[3][3],
-                          const Ruler *ruler, const GlassTube *tube, const FloorWave *waves, const double oil[3],
-                          float *light, float *over, float *shine, float (*floors)[2], int64_t samples,
-                          int64_t wave_count, int64_t rows, int64_t columns) {
+/* Picture of the still parts: floor with its ruler, seen through oil and a tube of glass.
+ *
+ * camera: packed; spots: samples of a pixel, for 4 x 4 neighbouring pixels; the first quarter also sees the glass;
+ * colours: of the ground, the ruler's paper and its ink; ruler: smallest |y| of the paper, smallest and largest |y| of
+ * the lines, largest |y| of the paper, distance from one line to the next, width of a line, m; tube: height of its
+ * axis, inner and outer radius, half its length (negative: there is none), m, absorption coefficient, 1/m; waves: of
+ * the floor's brightness: wavevector, 1/m, phase, relative amplitude; oil: absorption coefficients of red, green and
+ * blue, 1/m; light: light of the still parts, linear; over: transmission of the glass between robot and camera; shine:
+ * light mirrored by the glass; floors: x and y of the floor behind each pixel, m. */
+EXPORT void still_picture(const VirtualCamera *camera /* (17) */, const double *spots /* (16, samples, 2) */,
+                          const double colours[3][3], const Ruler *ruler /* (6) */, const GlassTube *tube /* (5) */,
+                          const FloorWave *waves /* (wave_count, 4) */, const double oil[3],
+                          float *light /* (rows, columns, 3) */, float *over /* (rows, columns) */,
+                          float *shine /* (rows, columns) */, float (*floors)[2] /* (rows, columns, 2) */,
+                          int64_t samples, int64_t wave_count, int64_t rows, int64_t columns) {
     const double *ground = colours[0], *paper = colours[1], *ink = colours[2];
     const int64_t few = samples / 4 > 1 ? samples / 4 : 1; /* samples that also see the glass */
     const double size = (double)samples, some = (double)few;

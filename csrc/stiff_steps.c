@@ -274,8 +274,9 @@ static double error_of(const Step *s, const Sizes *sizes, double near, double to
     return largest;
 }
 
-/* The state inside a step, of order 4, at a share of it from 0 to 1. */
-EXPORT void interpolate(double share, const double *y, const double *end, const double *increments, double *out) {
+/* Fill the state inside a step, of order 4, at a share of it from 0 to 1. */
+EXPORT void interpolate(double share, const double *y /* (19) */, const double *end /* (19) */,
+                        const double *increments /* (8, 19) */, double *out /* (19) */) {
     const double (*u)[STATES] = (const double (*)[STATES])increments;
     for (int i = 0; i < STATES; i++) {
         double k[3] = {0.0, 0.0, 0.0};
@@ -295,15 +296,22 @@ static bool has_crossed(double *gaps, const double *now, int64_t count) {
     return crossed;
 }
 
-EXPORT void rates(double *dy, double time, const double *y, double *data, const double *table, int64_t size,
-                  int64_t table_size) {
+/* Write the time derivative of a state into `dy`, and what is observed to the begin of `data`.
+ *
+ * dy: derivative of the state, the result; time: s; y: the state, see the constants of `rigid_links`; data: from
+ * `packed` of `tube_motion` or `two_links`; its rates are where the solution begins; table: the robot's table, (0,) for
+ * one without a tube. */
+EXPORT void rates(double *dy /* (19) */, double time, const double *y /* (19) */, double *data /* (size) */,
+                  const double *table /* (table_size) */, int64_t size, int64_t table_size) {
     PlaceMemory place;
     const Robot robot = robot_opened(data, table, size, table_size, &place);
     find_rates(&robot, time, y, dy);
 }
 
-EXPORT void observe(const double *time, const double *states, double *data, const double *table, double *out,
-                    int64_t count, int64_t size, int64_t table_size, int64_t columns) {
+/* Write what is observed in samples of one stretch between switchings into the rows of `out`, its first columns. */
+EXPORT void observe(const double *time /* (count) */, const double *states /* (count, 19) */, double *data /* (size) */,
+                    const double *table /* (table_size) */, double *out /* (count, columns) */, int64_t count,
+                    int64_t size, int64_t table_size, int64_t columns) {
     PlaceMemory place;
     const Robot robot = robot_opened(data, table, size, table_size, &place);
     double dy[STATES];
@@ -313,16 +321,21 @@ EXPORT void observe(const double *time, const double *states, double *data, cons
     }
 }
 
-EXPORT void gaps_of(const double *y, double *data, const double *table, double *gaps, int64_t size, int64_t table_size,
-                    int64_t count) {
+/* Fill the gap at every site, and last the smallest of the wire (infinite far from the wall), m.
+ *
+ * Without a tube: the thinnest film, from the tips of the roughness; infinite without a wall. */
+EXPORT void gaps_of(const double *y /* (19) */, double *data /* (size) */, const double *table /* (table_size) */,
+                    double *gaps /* (count) */, int64_t size, int64_t table_size, int64_t count) {
     PlaceMemory place;
     const Robot robot = robot_opened(data, table, size, table_size, &place);
     (void)count;
     find_gaps(&robot, y, gaps);
 }
 
-EXPORT double watched(const double *y, double outside, double *data, const double *table, const double *limits,
-                      double rough, double *gaps, int64_t size, int64_t table_size, int64_t count) {
+/* Write what a run is watched for into `gaps`; return the smallest gap. */
+EXPORT double watched(const double *y /* (19) */, double outside, double *data /* (size) */,
+                      const double *table /* (table_size) */, const double *limits /* (5) */, double rough,
+                      double *gaps /* (count) */, int64_t size, int64_t table_size, int64_t count) {
     PlaceMemory place;
     const Robot robot = robot_opened(data, table, size, table_size, &place);
     return watch(&robot, y, outside, (const Limits *)limits, rough, gaps, count);
@@ -376,10 +389,26 @@ static bool found_step(Run *run) {
     return true;
 }
 
-EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double tolerance, double *memory, double *y,
-                       double *before, double *increments, double *jacobian, double *gaps, const double *samples,
-                       double *states, const double *sizes, const double *limits, double rough, double *data,
-                       const double *table, int64_t count, int64_t sample_count, int64_t size, int64_t table_size) {
+/* Step on until a time, an event, or the number of steps is reached.
+ *
+ * Returns One of `DONE`, `PAUSED`, `CROSSED`, `STUCK`.
+ *
+ * stop: where to stop, s; clip: whether a step ends there; else the last one may go beyond; steps:
+ * number of steps at most; tolerance: error of a step over the sizes; memory: time and step length, see the constants;
+ * changed; y: the state, (19,); changed; before: state at the beginning of the last step; increments:
+ * those of the last step; jacobian: derivatives of the rates of what acts (`ACTING`) at the beginning
+ * of the last step, 1/s; gaps: what is watched, at `y`; changed; samples: increasing times, s: those in the steps taken
+ * are answered; states: states at the samples; sizes: sizes of the state's components below which nothing
+ * matters, (19,); a small change of time, s (0: nothing depends on it); a time of the order of the run's, s; limits:
+ * where tube and battery end; rough: height of the asperities, m; data: from `packed` of `tube_motion` or `two_links`;
+ * table: the robot's table, (0,) for one without walls. */
+EXPORT int64_t advance(double stop, bool clip, int64_t steps, double tolerance, double *memory /* (5) */,
+                       double *y /* (19) */, double *before /* (19) */, double *increments /* (8, 19) */,
+                       double *jacobian /* (8, 8) */, double *gaps /* (count) */,
+                       const double *samples /* (sample_count) */, double *states /* (sample_count, 19) */,
+                       const double *sizes /* (21) */, const double *limits /* (5) */, double rough,
+                       double *data /* (size) */, const double *table /* (table_size) */, int64_t count,
+                       int64_t sample_count, int64_t size, int64_t table_size) {
     PlaceMemory place;
     Run run = {
         .robot = robot_opened(data, table, size, table_size, &place),
@@ -388,7 +417,7 @@ EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double toleranc
         .rough = rough,
         .tolerance = tolerance,
         .stop = stop,
-        .clip = clip != 0,
+        .clip = clip,
         .memory = (Memory *)memory,
         .count = count,
         .step.u = (double (*)[STATES])increments,

@@ -336,30 +336,47 @@ static double offset_at_gap(const Film *film, double gap, double pitch, double y
     return NAN;
 }
 
-EXPORT double contact_offset(const double *rings, double radius, double pitch, int64_t count) {
+/* Offset e_c at which a body without yaw touches the floor of the tube, m.
+ *
+ * The body is the hull of rings about its axis, each the centre of an ellipse: (x, rho, semi-axis along, across), m. */
+EXPORT double contact_offset(const double *rings /* (count, 4) */, double radius, double pitch, int64_t count) {
     return contact_offset_at((const double (*)[4])rings, count, radius, pitch);
 }
 
-EXPORT double contact_offset_of(const double *packed, double pitch) {
+/* Offset at which the body of a packed table touches the floor of the tube without a yaw, m. */
+EXPORT double contact_offset_of(const double *packed /* (...) */, double pitch) {
     const Table table = table_opened(packed);
     return contact_offset_at(table.outline, table.rings, table.radius, pitch);
 }
 
-EXPORT double limited_yaw(const double *limit, double x, double pitch) { return largest_yaw_at(limit, x, pitch); }
+/* Largest yaw at a place, rad.
+ *
+ * limit: of `yaw_limit_of`; x: offset of the body's mid-length over R; pitch: nose up, rad. */
+EXPORT double limited_yaw(const double *limit /* (7) */, double x, double pitch) {
+    return largest_yaw_at(limit, x, pitch);
+}
 
-EXPORT double largest_yaw(const double *packed, double e, double pitch) {
+/* Largest yaw to either side at a place, rad: the table's nodes reach up to 0.95 of it. */
+EXPORT double largest_yaw(const double *packed /* (...) */, double e, double pitch) {
     const Table table = table_opened(packed);
     return largest_yaw_at(table.yaw_limit, e / table.radius, pitch);
 }
 
-EXPORT void outer_coefficients(const double *packed, double e, double pitch, double *out) {
+/* Fill the Fourier coefficients of the outer part's factor at a place without yaw, (phases, 36). */
+EXPORT void outer_coefficients(const double *packed /* (...) */, double e, double pitch, double *out /* (phases, 36) */,
+                               int64_t phases) {
+    (void)phases;
     const Table table = table_opened(packed);
     const Pose pose = {e, pitch, 0.0};
     const Position p = position_of(&table, pose);
     fill_coefficients(&table, &p, pose, out);
 }
 
-EXPORT int64_t resistance_at(const double *packed, double e, double pitch, double yaw, double phase, double *out) {
+/* Fill the symmetric 8x8 of a place, viscosity 1, in the robot's axes without roll; how the table's range was left.
+ *
+ * Returns `INSIDE`, or which range was left; then the answer is that of the nearest place inside. */
+EXPORT int64_t resistance_at(const double *packed /* (...) */, double e, double pitch, double yaw, double phase,
+                             double *out /* (8, 8) */) {
     const Table table = table_opened(packed);
     TablePlace place;
     table_place_at(&table, (Pose){e, pitch, yaw}, &place);
@@ -367,15 +384,24 @@ EXPORT int64_t resistance_at(const double *packed, double e, double pitch, doubl
     return place.left;
 }
 
-EXPORT int64_t mean_resistance_at(const double *packed, double e, double pitch, double yaw, int64_t phases,
-                                  double *out) {
+/* Fill the 8x8 of a place, averaged over phases of the tail; arguments as `resistance_at`.
+ *
+ * packed: from `packed`; e: offset of the body's mid-length from the tube's axis, m; pitch: nose up, away from the near
+ * wall, rad; yaw: nose to the side, rad; phases: number of phases, evenly spaced. */
+EXPORT int64_t mean_resistance_at(const double *packed /* (...) */, double e, double pitch, double yaw, int64_t phases,
+                                  double *out /* (8, 8) */) {
     const Table table = table_opened(packed);
     return table_mean_resistance(&table, (Pose){e, pitch, yaw}, phases, (double (*)[MOTIONS])out);
 }
 
-EXPORT void mean_resistances(const double *tables, const int64_t *which, const double *gap, const double *pitch,
-                             const double *yaw, int64_t phases, double *out, int64_t rows, int64_t size,
-                             int64_t count) {
+/* Fill the 8x8 at many places, averaged over the tail's phase, viscosity 1; NaN outside the table.
+ *
+ * tables: packed tables, one in each row, see `packed`; which: row of each place's table; gap: smallest distances
+ * between body and wall, m; pitch: nose up, rad; yaw: nose to the side, rad; phases: number of phases, evenly spaced. */
+EXPORT void mean_resistances(const double *tables /* (rows, size) */, const int64_t *which /* (count) */,
+                             const double *gap /* (count) */, const double *pitch /* (count) */,
+                             const double *yaw /* (count) */, int64_t phases, double *out /* (count, 8, 8) */,
+                             int64_t rows, int64_t size, int64_t count) {
     (void)rows;
     for (int64_t n = 0; n < count; n++) {
         const Table table = table_opened(tables + which[n] * size);

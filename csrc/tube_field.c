@@ -147,18 +147,24 @@ static void reflect(double weight, const double *layers, const WallFlows *flows,
     }
 }
 
-/* Amplitudes of the flows of which each wave of the wall's reflection consists.
+/* Add up the amplitudes of the flows of which each wave of the wall's reflection consists.
  *
  * Sources stand in columns along the tube. Of the forces the even part moves even waves, the odd part odd ones.
- * wave_k, weights, counts, bessel: k, weights, numbers of orders p, and K_1/K_0 at k radius, of each wave;
- * rho, angle, steepest: of columns, and the steepest wave that matters; first: number of each column's first source;
- * x, forces (n, 2, 3): of the sources; steps: I_{p+1}/I_p at the wall, (waves, most orders);
- * amplitudes: (waves, 2 parities, real and imaginary, most orders, 3). */
-EXPORT void wave_amplitudes(const double *wave_k, const double *weights, const int64_t *counts, const double *bessel,
-                            double radius, const double *rho, const double *angle, const double *steepest,
-                            const int64_t *first, const double *x, const double *forces, double *steps,
-                            double *amplitudes, int64_t waves, int64_t columns, int64_t edges, int64_t n,
-                            int64_t most) {
+ *
+ * wave_k: k of each wave; weights: of the nodes in k; counts: numbers of orders p; bessel: K_1/K_0 at k radius; radius:
+ * of the tube; rho: distance of each column from the axis; angle: polar angle of each column; steepest: wave that
+ * matters for each column; first: number of the first source of each column, and of all sources, (columns + 1,); x: of
+ * the sources; forces: even and odd part, along x, rho and theta; steps: to be filled with I_{p+1}/I_p at the wall;
+ * amplitudes: zeros, to be filled: even, odd; real, imaginary; order; flow.
+ *
+ * Threads share waves. */
+EXPORT void wave_amplitudes(const double *wave_k /* (waves) */, const double *weights /* (waves) */,
+                            const int64_t *counts /* (waves) */, const double *bessel /* (waves) */, double radius,
+                            const double *rho /* (columns) */, const double *angle /* (columns) */,
+                            const double *steepest /* (columns) */, const int64_t *first /* (edges) */,
+                            const double *x /* (n) */, const double *forces /* (n, 2, 3) */,
+                            double *steps /* (waves, most) */, double *amplitudes /* (waves, 2, 2, most, 3) */,
+                            int64_t waves, int64_t columns, int64_t edges, int64_t n, int64_t most) {
     (void)edges, (void)n;
     for (int64_t i = 0; i < waves; i++, amplitudes += 12 * most, steps += most) {
         const double k = wave_k[i], wall = k * radius;
@@ -229,13 +235,18 @@ static void add_orders(const FieldPoints *f, Waves w, double top, double radius,
     }
 }
 
-/* Add velocity (times 8 pi mu) and pressure (times 8 pi) of waves, (n, 4).
+/* Add velocity (times 8 pi mu) and pressure (times 8 pi) of waves.
  *
  * points: (x, y, z) about the tube's axis, no farther from it than the radius; steepest: wave from which on nothing is
- * added at each point, waves are faded out towards it; counts, steps, amplitudes: as in `wave_amplitudes`. */
-EXPORT void add_waves(const double *points, const double *steepest, const double *wave_k, const int64_t *counts,
-                      double radius, const double *steps, const double *amplitudes, double *field, int64_t n,
-                      int64_t waves, int64_t most) {
+ * added at each point; they are faded out towards it; wave_k: k of each wave; counts: numbers of orders p; radius: of
+ * the tube; steps: of `wave_amplitudes`; amplitudes: of `wave_amplitudes`; field: velocity (x, y, z) and pressure to
+ * add to.
+ *
+ * Threads share n. */
+EXPORT void add_waves(const double *points /* (n, 3) */, const double *steepest /* (n) */,
+                      const double *wave_k /* (waves) */, const int64_t *counts /* (waves) */, double radius,
+                      const double *steps /* (waves, most) */, const double *amplitudes /* (waves, 2, 2, most, 3) */,
+                      double *field /* (n, 4) */, int64_t n, int64_t waves, int64_t most) {
     double tops[waves];
     for (int64_t i = 0; i < waves; i++) {
         WallFlows flows[1];

@@ -115,8 +115,11 @@ static void next_extension(Orders *at, double u[9][LANES]) {
     step_order(at);
 }
 
-/* Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3). */
-EXPORT void wave_extensions(double k, double radius, const double *rho, double *out, int64_t n, int64_t orders) {
+/* Fill in the velocities (X, u_rho, v) at rho for unit velocities at the radius.
+ *
+ * k: wave number, above 0; radius: of the cylinder on which the waves are one; rho: where. */
+EXPORT void wave_extensions(double k, double radius, const double *rho /* (n) */, double *out /* (n, orders, 3, 3) */,
+                            int64_t n, int64_t orders) {
     WallFlows flows[orders];
     const Waves waves = {k, k * radius, 0, orders, flows};
     double lanes[LANES], ratios[orders + 2][LANES], u[9][LANES];
@@ -141,10 +144,11 @@ static double product(int64_t i, int64_t j, const double *w, double (*r)[LANES],
     return a > b ? r[b][0] * w[b] : q[a] * w[a];
 }
 
-/* Single layer S on a cylinder in unbounded fluid: velocities (X, u_rho, v) from densities (F, f_rho, g).
+/* Fill in the single layer S on a cylinder in unbounded fluid, in units of 4 pi R/(8 pi mu).
  *
- * In units of 4 pi R/(8 pi mu), symmetric, (orders, 3, 3); first: K_1(z)/K_0(z). */
-EXPORT void wall_layers(double z, double first, double *layers, int64_t orders) {
+ * z: k times the radius R; first: K_1(z)/K_0(z); layers: velocities (X, u_rho, v) from densities (F, f_rho, g),
+ * symmetric. */
+EXPORT void wall_layers(double z, double first, double *layers /* (orders, 3, 3) */, int64_t orders) {
     double r[orders + 3][LANES], q[orders + 3], w[orders + 3], lanes[LANES], scaled[LANES];
     EACH_LANE lanes[l] = z;
     fill_bessel_ratios(lanes, orders + 3, r, scaled);
@@ -271,12 +275,13 @@ static void fill_axes(const double *rotation, Angle theta, int lane, double axes
     }
 }
 
-/* Velocities (x, rho, theta) of waves around a cylinder, in cylindrical components about its own, parallel axis.
+/* Velocities (x, rho, theta) of even and odd waves in cylindrical components about a second, parallel axis.
  *
- * reference: its radius; offset: of its axis below the tube's; theta: angles about it.
- * out: even, odd; component; point; order; wall component. */
-EXPORT void circle_waves(double k, double radius, double reference, double offset, const double *theta, double *out,
-                         int64_t n, int64_t orders) {
+ * k: wave number, above 0; radius: of the tube; reference: radius of the cylinder about the second axis; offset: of the
+ * second axis below the tube's; theta: angles about the second axis; out: to be filled: even, odd; component; point;
+ * order; wall component. u_x comes times i. */
+EXPORT void circle_waves(double k, double radius, double reference, double offset, const double *theta /* (n) */,
+                         double *out /* (2, 3, n, orders, 3) */, int64_t n, int64_t orders) {
     static const double level[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
     const int64_t size = 3 * orders;
     WallFlows flows[orders];
@@ -330,15 +335,16 @@ static void fill_points(double k, double radius, const double *places, int64_t f
 
 /* Velocities (x, y, z) of waves at points.
  *
- * out: order from the first one; even, odd; real, imaginary part; wall component; point; component. */
-EXPORT void point_waves(double k, double radius, const double *places, int64_t first, double *out, int64_t n,
-                        int64_t orders) {
+ * k: wave number, above 0; radius: of the tube; places: points about the tube's axis; first: the first order p; out: to
+ * be filled: order; even, odd; real, imaginary part; wall component; point; component. */
+EXPORT void point_waves(double k, double radius, const double *places /* (n, 3) */, int64_t first,
+                        double *out /* (orders, 2, 2, 3, n, 3) */, int64_t n, int64_t orders) {
     fill_points(k, radius, places, first, out, NULL, n, orders);
 }
 
-/* The same in single precision. */
-EXPORT void single_point_waves(double k, double radius, const double *places, int64_t first, float *out, int64_t n,
-                               int64_t orders) {
+/* See `point_waves`; in single precision. */
+EXPORT void single_point_waves(double k, double radius, const double *places /* (n, 3) */, int64_t first,
+                               float *out /* (orders, 2, 2, 3, n, 3) */, int64_t n, int64_t orders) {
     fill_points(k, radius, places, first, NULL, out, n, orders);
 }
 
@@ -381,26 +387,30 @@ static void fill_rings(double k, double radius, const double *places, const doub
 
 /* Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
  *
- * places: on the rings, about the tube's axis, (n, angles, 3); theta: angles about the rings' axis; rotation: from the
- * rings' axes to the tube's.
- * out: even, odd; component; ring; order from the first one; real, imaginary part; wall component; angle. */
-EXPORT void ring_waves(double k, double radius, const double *places, const double *theta, const double *rotation,
-                       int64_t first, double *out, int64_t n, int64_t angles, int64_t orders) {
+ * k: wave number, above 0; radius: of the tube; places: points on the rings, about the tube's axis; theta: angles about
+ * the rings' axis; rotation: from the rings' axes to the tube's; first: the first order p; out: to be filled: even,
+ * odd; component; ring; order; real, imaginary part; wall component; angle. */
+EXPORT void ring_waves(double k, double radius, const double *places /* (n, angles, 3) */,
+                       const double *theta /* (angles) */, const double *rotation /* (3, 3) */, int64_t first,
+                       double *out /* (2, 3, n, orders, 2, 3, angles) */, int64_t n, int64_t angles, int64_t orders) {
     fill_rings(k, radius, places, theta, rotation, first, out, NULL, n, angles, orders);
 }
 
-/* The same in single precision. */
-EXPORT void single_ring_waves(double k, double radius, const double *places, const double *theta,
-                              const double *rotation, int64_t first, float *out, int64_t n, int64_t angles,
+/* See `ring_waves`; in single precision. */
+EXPORT void single_ring_waves(double k, double radius, const double *places /* (n, angles, 3) */,
+                              const double *theta /* (angles) */, const double *rotation /* (3, 3) */, int64_t first,
+                              float *out /* (2, 3, n, orders, 2, 3, angles) */, int64_t n, int64_t angles,
                               int64_t orders) {
     fill_rings(k, radius, places, theta, rotation, first, NULL, out, n, angles, orders);
 }
 
 /* Subtract a block from rows and columns of a square matrix, times a number for each column of the matrix.
  *
- * Both are in column-major order: columns (m, n) and (size, size). */
-EXPORT void subtract_block(const double *block, const int64_t *columns, const int64_t *rows, const double *scale,
-                           double *matrix, int64_t m, int64_t n, int64_t size) {
+ * block: its columns, one after the other; columns: of the matrix; rows: of the matrix; scale: number of each column of
+ * the matrix; matrix: its columns, one after the other. */
+EXPORT void subtract_block(const double *block /* (m, n) */, const int64_t *columns /* (m) */,
+                           const int64_t *rows /* (n) */, const double *scale /* (size) */,
+                           double *matrix /* (size, size) */, int64_t m, int64_t n, int64_t size) {
     for (int64_t j = 0; j < m; j++, block += n) {
         double *restrict column = matrix + columns[j] * size;
         for (int64_t i = 0; i < n; i++) column[rows[i]] -= scale[columns[j]] * block[i];

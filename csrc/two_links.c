@@ -127,6 +127,8 @@ double two_links_film(const TwoLinks *robot, const State *y) {
     return thinnest;
 }
 
-EXPORT double film_of(const double *y, const double *rotation, const double *wall, const double *ring, double *j) {
+/* Return the film between the wall and the surface about one ring of the robot, m; fill its loss per rate. */
+EXPORT double film_of(const double *y /* (19) */, const double *rotation /* (3, 3) */, const double *wall /* (4) */,
+                      const double *ring /* (6) */, double *j /* (6) */) {
     return film_at_ring((const Ring *)ring, (const Wall *)wall, (const State *)y, (const double (*)[3])rotation, j);
 }

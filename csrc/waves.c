@@ -8,8 +8,14 @@
  */
 #include "newey_west.h"
 
-EXPORT void ridge_of(const uint8_t *image, const double (*middle)[2], const double (*across)[2],
-                     const double contrast[3], int64_t inner, double *work, double *ridge, int64_t height,
+/* Ridge filter: contrast of a line at each pixel of a strip to both of its sides.
+ *
+ * image: the picture; middle: pixel of each row's middle; across: step from one column to the next, pixels; contrast:
+ * weight of each channel; inner: half the width of the line, columns; ridge: the strip; NaN in rows that leave the
+ * picture. */
+EXPORT void ridge_of(const uint8_t *image /* (height, width, 3) */, const double (*middle)[2] /* (rows, 2) */,
+                     const double (*across)[2] /* (rows, 2) */, const double contrast[3], int64_t inner,
+                     double *work /* (2, columns) */, double *ridge /* (rows, columns) */, int64_t height,
                      int64_t width, int64_t rows, int64_t columns) {
     const double half = 0.5 * ((double)columns - 1.0);
     const int64_t side = 2 * inner + 1;
@@ -91,9 +97,14 @@ static Crossing crossing_of(const Wave *w, const Tilt *tilt, double xi, double p
     };
 }
 
-EXPORT void wave_scores(const double *ridge, const double *xi, const Tilt *tilt, const Wave *packed, double step,
-                        int64_t every, const double (*turns)[2], double *scores, int64_t rows, int64_t columns,
-                        int64_t phases) {
+/* Mean ridge along the wire at evenly spaced phases; NaN with fewer than a third of the rows in the picture.
+ *
+ * ridge: the strip; xi: distance from the root of each row, m; tilt: of each row; packed: of the wire; step: width of a
+ * column, m; every: stride of the rows; turns: cosine and sine of the phases; scores: the score of each phase. */
+EXPORT void wave_scores(const double *ridge /* (rows, columns) */, const double *xi /* (rows) */,
+                        const Tilt *tilt /* (rows, 3) */, const Wave *packed /* (4) */, double step, int64_t every,
+                        const double (*turns)[2] /* (phases, 2) */, double *scores /* (phases) */, int64_t rows,
+                        int64_t columns, int64_t phases) {
     const Wave wave = with_taper(packed);
     const double half = 0.5 * ((double)columns - 1.0);
     int64_t count = 0;
@@ -247,9 +258,18 @@ static void assess(const Strip *strip, Row *rows, const View *view, const Normal
     }
 }
 
-EXPORT void wave_fit(const double *ridge, const double *xi, const Tilt *tilt, const Wave *packed, double phase,
-                     double step, double width, double usual, double likely_offset, double likely_lean, double *work,
-                     double answer[10], int64_t count, int64_t columns) {
+/* Robust Gauss-Newton fit of phase, lateral offset and tilt of a wire, from a phase nearby.
+ *
+ * ridge: the strip; xi: distance from the root of each row, m; tilt: of each row; packed: of the wire; phase: to begin
+ * with, rad; step: width of a column, m; width: of the wire, m; usual: typical ridge on the wire; likely_offset: prior
+ * standard deviation of the offset, m; likely_lean: prior standard deviation of the difference of offsets from end to
+ * end, m; answer: phase, its standard error, inlier share of the rows, offset, tilt, numerator and denominator of the
+ * handedness (0 as assumed, -2 opposite) and of the relative error of the amplitude, mean ridge; unchanged where too
+ * little is in view. */
+EXPORT void wave_fit(const double *ridge /* (count, columns) */, const double *xi /* (count) */,
+                     const Tilt *tilt /* (count, 3) */, const Wave *packed /* (4) */, double phase, double step,
+                     double width, double usual, double likely_offset, double likely_lean,
+                     double *work /* (count, 10) */, double answer[10], int64_t count, int64_t columns) {
     const Wave wave = with_taper(packed);
     const Strip strip = {ridge, xi, tilt, count, columns, step, usual};
     const double length = xi[count - 1] - xi[0];

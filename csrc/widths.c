@@ -33,10 +33,21 @@ static bool find_samples(Surroundings *s, double place, double far, int64_t fewe
     return s->end - s->first >= fewest;
 }
 
-EXPORT void stripe_edges(const double (*levels)[3], const double *angles, const double *blur, const double (*shade)[6],
-                         const double (*colours)[3], double roll, const double *tried, double step, double steepest,
-                         double around, double contrast, int64_t fewest, double *losses, double *found, int64_t count,
-                         int64_t stripes, int64_t trials) {
+/* Angles by which the edges between stripes lie beyond their even places, by least squares one by one.
+ *
+ * levels: colours along the angle; NaN where nothing is seen; angles: angles about the axis, ascending, rad; blur:
+ * standard deviation of the blur at each angle, rad; shade: shading factor and additive sheen at each angle, in each
+ * channel; colours: of the stripes in their order; roll: angle of the first stripe's middle, rad; tried: shifts that
+ * are tried, evenly spaced, rad; step: between them, rad; steepest: largest angle from the direction towards the camera
+ * at which an edge is located, rad; around: half width over that of a stripe of the surroundings; contrast: least
+ * distance of the colours on either side; fewest: fewest samples in the surroundings; found: the shifts, rad; NaN of
+ * edges that are out of view. */
+EXPORT void stripe_edges(const double (*levels)[3] /* (count, 3) */, const double *angles /* (count) */,
+                         const double *blur /* (count) */, const double (*shade)[6] /* (count, 6) */,
+                         const double (*colours)[3] /* (stripes, 3) */, double roll, const double *tried /* (trials) */,
+                         double step, double steepest, double around, double contrast, int64_t fewest,
+                         double *losses /* (trials) */, double *found /* (stripes) */, int64_t count, int64_t stripes,
+                         int64_t trials) {
     Surroundings near = {levels, angles, blur, shade, 0, 0};
     const double width = 2.0 * PI / (double)stripes;
     for (int64_t edge = 0; edge < stripes; edge++) {

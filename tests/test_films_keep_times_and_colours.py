@@ -9,7 +9,7 @@ import pytest
 
 from spirillum.errors import InputError
 from spirillum.formats.h264 import h264_writer
-from spirillum.kernels.rendering import film_colours
+from spirillum.kernels.core import film_colours
 
 SIZE = (64, 48)
 FINE = {"crf": "8", "preset": "veryfast"}

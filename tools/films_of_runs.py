@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 import spirillum as sp
 from spirillum.dynamics.run_file import rotation_matrix
 from spirillum.fluid.tube.library import tables_of
-from spirillum.kernels import tube_table
+from spirillum.kernels import core, tube_table
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 
@@ -123,7 +123,7 @@ class Side:
         out = np.empty((SLICES, 6))
         for n in range(SLICES):  # each with its own viscosity
             numbers = (np.array([number]) for number in (gap[n], self.bend, v[n], u[n]))
-            tube_table.lift_of_cavitation(*numbers, eta[n], self.fluid.cavitation_pressure or np.inf, out[n : n + 1])
+            core.lift_of_cavitation(*numbers, eta[n], self.fluid.cavitation_pressure or np.inf, out[n : n + 1])
         squeeze, roll = -3.0 * np.pi * eta * self.bend * width / gap**2 * v, -4.0 * np.pi * eta * width / gap * u
         shear = -np.pi * self.fluid.viscosity * width / gap * slip
         linear = (self.length * squeeze) @ opening + (self.length * roll) @ entrained + (self.length * shear) @ surface
@@ -164,8 +164,8 @@ def body_torques(robot: sp.Robot, table: Vector, now: Any) -> tuple[dict[str, fl
     """Torques on the body about its axis, N m, and force of film and cavitation on it towards the tube's axis, N."""
     at, eta = moment_of(now), robot.fluid.viscosity
     matrix, film = np.empty((8, 8)), np.empty((6, 6))
-    tube_table.resistance_at(table, *at.pose, at.phase, matrix)
-    tube_table.film_at(table[tube_table.film_start(table) :], *at.pose, film)
+    core.resistance_at(table, *at.pose, at.phase, matrix)
+    core.film_at(table[tube_table.film_start(table) :], *at.pose, film)
     linear = -eta * film @ at.rates[:6]
     row = matrix[ROLL, :7] - matrix[JOINT, :7]  # of both links, without the rotor
     row[:6] -= film[ROLL]

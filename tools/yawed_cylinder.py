@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spirillum.fluid.tube.film import film_resistance
-from spirillum.kernels.contacts import asperity_load
-from spirillum.kernels.tube_table import lift_of_cavitation
+from spirillum.kernels.core import asperity_load, lift_of_cavitation
 from spirillum.robot.outline import body_outline
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -41,7 +41,7 @@ class StandIn:
     def level_resistance(table: Samples, offset: float) -> Samples:
         """The 8x8 of a table at an offset, level and at phase 0."""
         out = np.empty((8, 8))
-        _stand_in_at(table, offset, out)
+        stand_in_at(table, offset, out)
         return out
 
     @staticmethod
@@ -61,8 +61,8 @@ class StandIn:
         return np.concatenate([np.ravel(matrix), [radius, body, sliding, axial, largest], np.ravel(stations)])
 
 
-@native("out", symbol="stand_in_at")
-def _stand_in_at(table: Float64[Array, "size"], offset: float, out: Float64[Array, "8 8"]) -> None:  # noqa: F821
+@native("out")
+def stand_in_at(table: Float64[Array, "size"], offset: float, out: Float64[Array, "8 8"]) -> None:  # noqa: F821
     """Fill the 8x8 of the stand-in, level and at phase 0."""
 
 
@@ -87,13 +87,13 @@ def _library() -> Path:
 def stand_in() -> Iterator[StandIn]:
     """Let the engine run on the stand-in."""
     from spirillum.dynamics import free_robot, integration, return_map
+    from spirillum.kernels import core
     from spirillum.kernels import native as calls
-    from spirillum.kernels import stiff_steps
 
     library = ctypes.CDLL(str(_library()))
-    steps = SimpleNamespace(**runpy.run_path(stiff_steps.__file__))  # whose calls have not found their library yet
+    steps = SimpleNamespace(**runpy.run_path(core.__file__))  # whose calls have not found their library yet
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calls, "library", lambda: library)
         for module in (free_robot, integration, return_map):
-            patch.setattr(module, "stiff_steps", steps)
+            patch.setattr(module, "core", steps)
         yield StandIn(steps)

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import posteriors
 import spirillum as sp
+from spirillum.kernels import core
 from spirillum.kernels import motor as kernel
 
 WIDE = "biorob2012-wide"
@@ -102,7 +103,7 @@ def test_error_falls_with_the_fourth_power_of_the_pieces() -> None:
     charges = []
     for fineness in (0.5, 1.0, 2.0, 16.0):
         state = np.zeros((1, kernel.STATES))
-        kernel.advance(robots.numbers, state, 1 / 30, np.ones(1), np.zeros(1), fineness)
+        core.advance_axial(robots.numbers, state, 1 / 30, np.ones(1), np.zeros(1), fineness)
         charges.append(state[0, kernel.CHARGE])
     errors = np.abs(np.array(charges[:3]) / charges[3] - 1.0)
     assert errors[1] < 3e-6

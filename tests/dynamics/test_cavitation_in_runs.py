@@ -10,7 +10,7 @@ from tests.support.reynolds import run_lift
 
 import spirillum as sp
 from spirillum.dynamics.free_robot import weight_of
-from spirillum.kernels.tube_table import lift_of_cavitation
+from spirillum.kernels.core import lift_of_cavitation
 
 
 @cache

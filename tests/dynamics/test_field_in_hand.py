@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 import spirillum as sp
 from spirillum.dynamics.plant import Plant
-from spirillum.kernels.rigid_links import AXIS_Y, AXIS_Z, DRIVE, FIELD, FIELD_PHASE, FIELD_RATE, field_at
+from spirillum.kernels.core import field_at
+from spirillum.kernels.rigid_links import AXIS_Y, AXIS_Z, DRIVE, FIELD, FIELD_PHASE, FIELD_RATE
 
 
 @pytest.mark.parametrize(("yaw", "pitch"), [(0.0, 0.0), (0.3, 0.0), (-0.2, 0.5)])

@@ -19,7 +19,7 @@ from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import least_checked_gap
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import largest_yaw
+from spirillum.kernels.core import largest_yaw
 from spirillum.robot.batch import RobotBatch
 
 ROUGH = "100 um"  # it comes to rest soon

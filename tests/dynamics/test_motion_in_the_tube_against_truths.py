@@ -22,7 +22,7 @@ from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube
 from spirillum.errors import InputError
-from spirillum.kernels import contacts, rigid_links
+from spirillum.kernels import contacts, core, rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
@@ -179,12 +179,12 @@ def test_robot_at_rest_lies_on_its_asperities_with_its_weight(made: Any) -> None
 def test_load_and_energy_of_asperities() -> None:
     """W at half their height, none beyond, without bound below; the energy is its integral."""
     height, load = 3e-6, 0.02
-    assert contacts.asperity_load(0.5 * height, height, load) == pytest.approx(load)
-    assert contacts.asperity_load(height, height, load) == 0.0
+    assert core.asperity_load(0.5 * height, height, load) == pytest.approx(load)
+    assert core.asperity_load(height, height, load) == 0.0
     gaps = np.linspace(0.02, 1.0, 4001) * height
-    loads = np.array([contacts.asperity_load(gap, height, load) for gap in gaps])
+    loads = np.array([core.asperity_load(gap, height, load) for gap in gaps])
     assert np.all(np.diff(loads) <= 0)
-    gained = np.array([contacts.asperity_energy(gap, height, load) for gap in gaps])
+    gained = np.array([core.asperity_energy(gap, height, load) for gap in gaps])
     slopes = -np.gradient(gained, gaps, edge_order=2)
     np.testing.assert_allclose(slopes[2000:-5], loads[2000:-5], rtol=2e-3, atol=1e-6 * load)
 
@@ -303,7 +303,7 @@ def test_rates_solve_the_balance(made: Any) -> None:
         a, force = half.T @ half + np.diag(1e-6 + np.sum(half**2, axis=0)), rng.normal(size=7)
         loads, rows = 10.0 ** rng.uniform(-2, 0.5, 4), rng.normal(size=(4, 2, 7))
         q, r = np.zeros(7), np.empty(7)
-        assert contacts.balanced(a, force, loads, rows, 1e-5, q, r) < 1e-10
+        assert core.balanced(a, force, loads, rows, 1e-5, q, r) < 1e-10
         sliding = np.einsum("cdi,i->cd", rows, q)
         speed = np.sqrt(np.sum(sliding**2, axis=1) + 1e-5**2)
         left = a @ q + np.einsum("c,cd,cdi->i", loads / speed, sliding, rows) - force
@@ -332,9 +332,9 @@ def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
     def gap(step: np.ndarray, j: np.ndarray, site: Any) -> float:
         state, rotation = state_of(step)
         if site is not None:
-            return contacts.ring_gap(state, rotation, 0.02, site, normal, point, j)
+            return core.ring_gap(state, rotation, 0.02, site, normal, point, j)
         bracket = np.array([0.03, 0.035, 0.045])
-        return contacts.crest(state, rotation, 0.02, links.wire, links.stations, bracket, normal, point, j)
+        return core.crest(state, rotation, 0.02, links.wire, links.stations, bracket, normal, point, j)
 
     for site in (*sites, None):
         j = np.empty(7)
@@ -365,7 +365,7 @@ def test_gap_of_a_site_is_that_of_its_points(made: Any) -> None:
             points = state[:3] + turned.apply(np.stack([along, *across], axis=-1).reshape(-1, 3))
             dense = 0.02 - ball - np.hypot(points[:, 1], points[:, 2]).max()
             site = np.array([x, ring, half, ball, turning])
-            found = contacts.ring_gap(state, turned.as_matrix(), 0.02, site, normal, point, j)
+            found = core.ring_gap(state, turned.as_matrix(), 0.02, site, normal, point, j)
             assert found == pytest.approx(dense, abs=3e-8), site
             touching = state[:3] + turned.apply(point)
             assert 0.02 - np.hypot(*touching[1:]) == pytest.approx(found, abs=1e-14)

@@ -188,8 +188,7 @@ def test_film_is_lost_as_its_gradient_says() -> None:
     """By finite differences of place and attitude, for a tilted sphere-ended, an edged and an ellipsoidal ring."""
     from scipy.spatial.transform import Rotation
 
-    from spirillum.kernels import rigid_links
-    from spirillum.kernels import two_links as kernel
+    from spirillum.kernels import core, rigid_links
 
     wall = np.array([0.02, 1e-6, np.inf, 1.0])
     place, attitude = np.array([0.0, 2.1e-3, -8.5e-3]), Rotation.from_euler("xyz", [0.3, 0.1, -0.07])
@@ -199,7 +198,7 @@ def test_film_is_lost_as_its_gradient_says() -> None:
         state[:3] = place + attitude.apply(step[:3])
         turned = attitude * Rotation.from_rotvec(step[3:])
         state[3:7] = turned.as_quat(scalar_first=True)
-        return float(kernel.film_of(state, np.ascontiguousarray(turned.as_matrix()), wall, spot, gradient))
+        return float(core.film_of(state, np.ascontiguousarray(turned.as_matrix()), wall, spot, gradient))
 
     for reach in (0.0, 0.009, 0.014):
         spot = np.array([0.008, 0.009, reach, 1.0, 1.0, 1.0])

@@ -10,8 +10,8 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.fluid.tube.nodes import rings_of
-from spirillum.kernels import contacts, rigid_links
-from spirillum.kernels.tube_table import clearance, contact_offset, smallest_gap
+from spirillum.kernels import core, rigid_links
+from spirillum.kernels.core import clearance, contact_offset, smallest_gap
 from spirillum.robot.outline import Outline, body_outline, profile_outline
 from spirillum.robot.tube_pose import TubePose
 
@@ -74,7 +74,7 @@ def test_gap_and_contact_are_those_of_the_outline(name: str, pitch: float, yaw: 
     normal, point, j = np.empty(3), np.empty(3), np.empty(7)
     gaps = []
     for ring in body.rings:
-        gaps.append(contacts.ring_gap(state, rotation, TUBE, np.array([*ring, 0.0]), normal, point, j))
+        gaps.append(core.ring_gap(state, rotation, TUBE, np.array([*ring, 0.0]), normal, point, j))
         touching = state[:3] + rotation @ point
         assert TUBE - np.hypot(*touching[1:]) == pytest.approx(gaps[-1], abs=1e-12)
     assert min(gaps) == pytest.approx(1e-3, abs=allowed)

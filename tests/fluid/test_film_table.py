@@ -12,7 +12,8 @@ from spirillum.fluid.tube.film import FilmTable, _head, film_resistance
 from spirillum.fluid.tube.film_surface import FilmBody, Place, frame
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import film_at, parts_of, smallest_gap
+from spirillum.kernels.core import film_at, smallest_gap
+from spirillum.kernels.tube_table import parts_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from tests.support.reynolds import ShortCylinder
 
 from spirillum.fluid.tube.film import film_resistance
-from spirillum.kernels.tube_table import lift_of_cavitation
+from spirillum.kernels.core import lift_of_cavitation
 from spirillum.robot.outline import body_outline
 
 BODY, TUBE, LENGTH = 9e-3, 20e-3, 17e-3

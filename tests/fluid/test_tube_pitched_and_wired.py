@@ -14,7 +14,7 @@ from spirillum.fluid.tube.wall import point_reflection, waves_between
 from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, wire_along, wire_system
-from spirillum.kernels.stokes_flow import force_matrix
+from spirillum.kernels.core import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
 from spirillum.robot.tube_pose import TubePose
 

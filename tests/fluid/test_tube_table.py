@@ -37,8 +37,9 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.table import TubeTable, key_of, packed_from, to_bytes
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels import core
 from spirillum.kernels import tube_table as kernel
-from spirillum.kernels.tube_table import film_at
+from spirillum.kernels.core import film_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
 from spirillum.robot.tube_pose import TubePose
@@ -91,7 +92,7 @@ def smooth(t: float, f: float, phases: int = 5) -> np.ndarray:
 
 def at(table: np.ndarray, e: float, pitch: float, yaw: float = 0.0, phase: float = 0.0) -> tuple[np.ndarray, int]:
     out = np.empty((8, 8))
-    return out, kernel.resistance_at(table, e, pitch, yaw, phase, out)
+    return out, core.resistance_at(table, e, pitch, yaw, phase, out)
 
 
 def sum_at(coefficients: np.ndarray, phase: float) -> np.ndarray:
@@ -115,7 +116,7 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
     for _ in range(40):
         t, row = draw.uniform(places.gaps[0], 1.0), places
         pitch = draw.uniform(-0.05, 0.05)
-        e = (1.0 - t) * kernel.contact_offset(row.rings, R, pitch)
+        e = (1.0 - t) * core.contact_offset(row.rings, R, pitch)
         side = 0 if pitch >= 0 else 1
         nodes = np.sqrt(places.gaps)
         most = sum(
@@ -131,7 +132,7 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
         film_at(film, e, pitch, 0.0, thin)
         factor = lower(smooth(t, f, phases), phase)
         expected = factor @ factor.T
-        expected[:6, :6] += kernel.cut_of_film(t) * thin
+        expected[:6, :6] += core.cut_of_film(t) * thin
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
 
 
@@ -151,13 +152,13 @@ def test_positive_definite_and_symmetric_everywhere(places: Places, film: np.nda
 def test_the_rest_goes_on_linearly_below_the_first_node(places: Places, film: np.ndarray) -> None:
     table = packed(places, film, smooth)
     out = np.empty((3, 5, kernel.PARAMETERS))
-    room = kernel.contact_offset(places.rings, R, 0.0)
+    room = core.contact_offset(places.rings, R, 0.0)
     for n, t in enumerate((0.0, 0.5 * places.gaps[0], places.gaps[0])):
-        kernel.outer_coefficients(table, (1.0 - t) * room, 0.0, out[n])
+        core.outer_coefficients(table, (1.0 - t) * room, 0.0, out[n])
     np.testing.assert_allclose(out[1], 0.5 * (out[0] + out[2]), atol=1e-12)
     step = 1e-7 * places.gaps[0]
     above = np.empty_like(out[0])
-    kernel.outer_coefficients(table, (1.0 - places.gaps[0] - step) * room, 0.0, above)
+    core.outer_coefficients(table, (1.0 - places.gaps[0] - step) * room, 0.0, above)
     np.testing.assert_allclose((above - out[2]) / step, (out[2] - out[0]) / places.gaps[0], rtol=1e-4, atol=1e-5)
 
 
@@ -165,7 +166,7 @@ def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
     table = packed(places, film, smooth)
     assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
     turned = packed(places, film, smooth, lambda t, f: np.zeros((kernel.YAW_ORDERS, 5, 36)))
-    most = kernel.largest_yaw(turned, 0.0, 0.0)
+    most = core.largest_yaw(turned, 0.0, 0.0)
     assert most == pytest.approx(places.largest_yaw(1.0, 0.0))
     assert at(turned, 0.0, 0.0, 1.02 * kernel.YAW_SLACK * most)[1] == kernel.TOO_FAR_YAWED
     assert at(turned, 0.0, 0.0, 0.98 * kernel.YAW_SLACK * most)[1] == kernel.INSIDE
@@ -180,10 +181,10 @@ def test_yaw_enters_as_powers_of_the_stretched_one(places: Places, film: np.ndar
     thin = np.zeros((2, 6, 6))
     film_at(film, e, 0.0, yaw, thin[0])
     film_at(film, e, 0.0, 0.0, thin[1])
-    w = kernel.cut_of_film(1.0 - e / kernel.contact_offset(places.rings, R, 0.0))
+    w = core.cut_of_film(1.0 - e / core.contact_offset(places.rings, R, 0.0))
     turned[:6, :6] -= w * thin[0]
     level[:6, :6] -= w * thin[1]
-    s = kernel.stretched_yaw(yaw / kernel.largest_yaw(table, e, 0.0))
+    s = core.stretched_yaw(yaw / core.largest_yaw(table, e, 0.0))
     more = 3.0 * float(powers @ s ** np.arange(1, 7))  # coefficients 1, cos and cos 2 at phase 0
     assert np.log(turned[0, 0] / level[0, 0]) == pytest.approx(2.0 * more, rel=1e-9)
 
@@ -192,7 +193,7 @@ def test_beyond_the_last_node_the_yaw_goes_on_by_its_tangent(places: Places, fil
     """To either side, without a kink: the logarithm of the first entry of the rest is linear in the stretched yaw."""
     draw = np.random.default_rng(3).normal(size=(kernel.YAW_ORDERS, 5, 36))
     table = packed(places, film, smooth, lambda t, f: draw)
-    most = kernel.largest_yaw(table, 0.0, 0.0)  # on the axis, where no film is added
+    most = core.largest_yaw(table, 0.0, 0.0)  # on the axis, where no film is added
     last = kernel.YAW_SHARES[-1]
 
     def logarithm(share: float) -> float:
@@ -201,7 +202,7 @@ def test_beyond_the_last_node_the_yaw_goes_on_by_its_tangent(places: Places, fil
     for side in (-1.0, 1.0):
         inside, node, beyond, far = (side * share for share in (last - 1e-4, last, 1.03, 1.09))
         slopes = [
-            (logarithm(b) - logarithm(a)) / (kernel.stretched_yaw(b) - kernel.stretched_yaw(a))
+            (logarithm(b) - logarithm(a)) / (core.stretched_yaw(b) - core.stretched_yaw(a))
             for a, b in ((inside, node), (node, beyond), (beyond, far))
         ]
         assert slopes[1] == pytest.approx(slopes[2], rel=1e-9)
@@ -214,7 +215,7 @@ def test_beyond_the_last_node_the_yaw_goes_on_by_its_tangent(places: Places, fil
 )
 def test_contact_offset_is_where_the_body_touches(shape: tuple, pitch: float) -> None:
     outline = body_outline(shape[0], 0.018, 0.044, 0.003, shape[1], shape[2])
-    offset = kernel.contact_offset(rings_of(outline), R, pitch)
+    offset = core.contact_offset(rings_of(outline), R, pitch)
     assert TubePose(R, offset, pitch).clearance(outline) == pytest.approx(0.0, abs=1e-8)
 
 
@@ -277,14 +278,14 @@ def test_a_node_gives_its_matrix_back_at_every_phase() -> None:
     def full(phase: float) -> np.ndarray:
         factor = lower(planted, phase)
         matrix = factor @ factor.T
-        matrix[:6, :6] += kernel.cut_of_film(0.3) * film
+        matrix[:6, :6] += core.cut_of_film(0.3) * film
         return matrix
 
     for count, enough in ((5, False), (7, True), (PHASES, True)):
         found = rest_at(np.stack([full(phase) for phase in even_phases(count)]), film, 0.3, pose)
         assert found.shape == (PHASES, kernel.PARAMETERS)
         back = matrices_at(found, np.array([1.234]))[0]
-        back[:6, :6] += kernel.cut_of_film(0.3) * film
+        back[:6, :6] += core.cut_of_film(0.3) * film
         assert np.allclose(back, full(1.234), rtol=1e-10, atol=1e-12) is enough
 
 
@@ -295,7 +296,7 @@ def test_yawed_nodes_are_met() -> None:
     powers = _powers(middle, sides)
     for share, (left, right) in zip(kernel.YAW_SHARES, sides, strict=True):
         for sign, expected in ((1.0, left), (-1.0, right)):
-            s = kernel.stretched_yaw(sign * share)
+            s = core.stretched_yaw(sign * share)
             found = middle + np.tensordot(s ** np.arange(1, 7), powers, axes=1)
             np.testing.assert_allclose(found, expected, atol=1e-12)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.kernels.stokes_flow import add_blobs, add_moments, force_matrix, moment_matrices
+from spirillum.kernels.core import add_blobs, add_moments, force_matrix, moment_matrices
 
 
 def kernel(x: np.ndarray, e: float) -> np.ndarray:

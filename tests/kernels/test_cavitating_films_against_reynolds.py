@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_banded
 from scipy.optimize import brentq
 
-from spirillum.kernels.tube_table import lift_of_cavitation
+from spirillum.kernels.core import lift_of_cavitation
 
 ETA, BEND = 1.0, 0.0164
 """Viscosity, Pa s, and R' of the paper's body in the wide tube, m."""

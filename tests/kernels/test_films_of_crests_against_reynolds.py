@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from spirillum.kernels import contacts, rigid_links
+from spirillum.kernels import core, rigid_links
 
 TUBE, WIRE, AMPLITUDE, WAVELENGTH, OIL = 20e-3, 0.5e-3, 2.5e-3, 25e-3, 3.5
 RATE, JOINT = 2.0 * np.pi * 1.5, 6
@@ -39,7 +39,7 @@ def film(gap: float, bound: float, *, at: float = 30e-3, is_line: bool = False) 
     state[3], rates[JOINT] = 1.0, RATE
     state[7] = -0.5 * np.pi + K * at
     bracket = np.minimum(at + np.array([-0.5e-3, 0.0, 0.5e-3]), 60e-3)
-    found = contacts.crest_film(state, np.eye(3), TUBE, wire, stations, bracket, OIL, bound, rates, force)
+    found = core.crest_film(state, np.eye(3), TUBE, wire, stations, bracket, OIL, bound, rates, force)
     return found, force
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.fluid.wire.sources import Panels
-from spirillum.kernels.stokes_flow import add_layer, ring_blocks
+from spirillum.kernels.core import add_layer, ring_blocks
 
 MODES = 4
 RULE = 2e-6

@@ -9,8 +9,8 @@ import spirillum as sp
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import contacts, rigid_links, stiff_steps, tube_motion, two_links
-from spirillum.kernels.tube_table import resistance_at
+from spirillum.kernels import core, rigid_links, stiff_steps, tube_motion, two_links
+from spirillum.kernels.core import resistance_at
 from spirillum.robot.batch import RobotBatch
 
 RADIUS, VISCOSITY, MU, SLOW = 0.02, 0.9, 0.2, 1e-5
@@ -102,11 +102,11 @@ def test_rates_without_a_tube(kind: float, fixed: float, gap: float) -> None:
     none = np.zeros(0)
     data = two_links.packed(case.drag, case.friction, case.weight, wall, ring, case.drive)
     dy, j, thinnest = np.empty(19), np.empty(6), np.empty(1)
-    stiff_steps.rates(dy, 0.7, case.state, data, none)
-    stiff_steps.gaps_of(case.state, data, none, thinnest)
+    core.rates(dy, 0.7, case.state, data, none)
+    core.gaps_of(case.state, data, none, thinnest)
     turn = about_x(case.state[7])[:7, :7]
     a, (weight, field) = turn @ case.drag @ turn.T + case.friction, case.loads(0.7)
-    film = two_links.film_of(case.state, case.axes, wall, ring[0], j)
+    film = core.film_of(case.state, case.axes, wall, ring[0], j)
     assert (thinnest[0], data[rigid_links.FILM]) == (pytest.approx(film, rel=1e-9), pytest.approx(film, rel=1e-9))
     h = max(film, 1e-9 * rough)
     if h < ring[0, 5]:
@@ -154,8 +154,8 @@ def test_rates_in_a_tube(table: np.ndarray, kind: float, fixed: float, ends: flo
     flow = np.array([[0.0, 0.0], [0.5, 1e-3], [1.0, 3e-3], [2.0, 0.0]])
     data = tube_motion.packed(case.friction, case.weight, case.drive, tube, np.zeros(6), sites, np.zeros((0, 4)), flow)
     dy, gaps = np.empty(19), np.empty(3)
-    stiff_steps.rates(dy, 0.7, case.state, data, table)
-    stiff_steps.gaps_of(case.state, data, table, gaps)
+    core.rates(dy, 0.7, case.state, data, table)
+    core.gaps_of(case.state, data, table, gaps)
     q, m = data[:7], fluid_at(table, case)
     weight, field = case.loads(0.7)
     mean_flow = 1e-3 + 0.4 * 2e-3 if ends == tube_motion.IMPOSED else 0.0
@@ -167,8 +167,8 @@ def test_rates_in_a_tube(table: np.ndarray, kind: float, fixed: float, ends: flo
     lost = normal_force = 0.0
     for site, found in zip(sites, gaps, strict=False):
         normal, point, j, rows = np.empty(3), np.empty(3), np.empty(7), np.empty((2, 7))
-        assert contacts.ring_gap(case.state, case.axes, RADIUS, site, normal, point, j) == found
-        load = contacts.asperity_load(found, rough, 0.05)
+        assert core.ring_gap(case.state, case.axes, RADIUS, site, normal, point, j) == found
+        load = core.asperity_load(found, rough, 0.05)
         for row, way in zip(rows, (case.axes[0], np.cross(case.axes[0], normal)), strict=True):
             turning = np.cross(point, way)
             row[:] = *way, *turning, site[4] * turning[0]
@@ -198,7 +198,7 @@ def test_steps_are_those_of_another_method() -> None:
     y[3:7] /= np.linalg.norm(y[3:7])
 
     def rates(time: float, state: np.ndarray) -> np.ndarray:
-        stiff_steps.rates(dy, time, state, data, none)
+        core.rates(dy, time, state, data, none)
         return dy.copy()
 
     times = np.linspace(0.0, 2.0, 9)[1:]
@@ -207,7 +207,7 @@ def test_steps_are_those_of_another_method() -> None:
     memory[stiff_steps.STEP] = 1e-4
     sizes, limits = np.append(np.ones(19), [1e-6, 1.0]), np.array([np.inf, 0.0, 0.0, 0.0, np.inf])
     sizes[:3] = 0.01
-    end = stiff_steps.advance(
+    end = core.advance(
         2.0, True, 100_000, 1e-9, memory, y, y.copy(), np.zeros((8, 19)), np.zeros((8, 8)), np.ones(4), times,
         found, sizes, limits, 0.0, data, none,
     )  # fmt: skip

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from scipy.special import ellipe, ellipk
 
-from spirillum.kernels.stokes_flow import ring_blocks, ring_integrals
+from spirillum.kernels.core import ring_blocks, ring_integrals
 
 MODES = 12
 # dx, rho of the target, rho of the source, blob radius.

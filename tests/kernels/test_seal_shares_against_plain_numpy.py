@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from spirillum.kernels.edges import seal_shares, seal_shifts
+from spirillum.kernels.core import seal_shares, seal_shifts
 
 OFFSETS = np.arange(-6.0, 7.0)
 SIDES = np.array([[0, 12, 0], [12, 30, 1], [30, 36, 0]])

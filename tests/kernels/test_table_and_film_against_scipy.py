@@ -8,7 +8,7 @@ import spirillum as sp
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import tube_table
+from spirillum.kernels import core, tube_table
 from spirillum.robot.batch import RobotBatch
 
 
@@ -23,7 +23,7 @@ def table(request: pytest.FixtureRequest) -> np.ndarray:
 def film_of(film: np.ndarray, e: float, pitch: float, yaw: float) -> np.ndarray:
     """M D M' from a tensor product of splines, turned from the wall's normal to z'."""
     c = np.empty(5)
-    tube_table.film_coordinates(film, e, pitch, yaw, c)
+    core.film_coordinates(film, e, pitch, yaw, c)
     shape = tube_table.shape_of(film)
     values = film[tube_table.HEAD :].view(np.float32)[: np.prod(shape)].astype(float).reshape(shape)
     for at, (low, high, intervals) in zip(c[:2], (film[7:10], film[10:13]), strict=True):
@@ -69,11 +69,11 @@ def test_the_table_is_film_and_outer_part_as_scipy_interpolates_them(
     pitch = f * float(BarycentricInterpolator(np.sqrt(nodes[:gaps]), most)(np.sqrt(t)))
     if pitch > tube_table.STEEPEST[0]:
         pytest.skip("steeper than a table")
-    e = (1.0 - t) * tube_table.contact_offset_of(table, pitch)
+    e = (1.0 - t) * core.contact_offset_of(table, pitch)
     expected = outer_of(table, t, f, phase)
-    expected[:6, :6] += tube_table.cut_of_film(t) * film_of(tube_table.parts_of(table).film, e, pitch, 0.0)
+    expected[:6, :6] += core.cut_of_film(t) * film_of(tube_table.parts_of(table).film, e, pitch, 0.0)
     found = np.empty((8, 8))
-    assert tube_table.resistance_at(table, e, pitch, 0.0, phase, found) == tube_table.INSIDE
+    assert core.resistance_at(table, e, pitch, 0.0, phase, found) == tube_table.INSIDE
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11 * np.abs(expected).max())
 
 
@@ -81,8 +81,8 @@ def test_the_table_is_film_and_outer_part_as_scipy_interpolates_them(
 def test_the_film_is_a_tensor_product_of_splines(table: np.ndarray, pitch: float, yaw: float) -> None:
     film = np.ascontiguousarray(tube_table.parts_of(table).film)
     for share in (0.5, 0.9, 0.97):
-        e = share * tube_table.contact_offset_of(table, pitch)
+        e = share * core.contact_offset_of(table, pitch)
         expected, found = film_of(film, e, pitch, yaw), np.empty((6, 6))
-        gap = tube_table.film_at(film, e, pitch, yaw, found)
-        assert gap == tube_table.smallest_gap(film, e, pitch, yaw) > 0
+        gap = core.film_at(film, e, pitch, yaw, found)
+        assert gap == core.smallest_gap(film, e, pitch, yaw) > 0
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())

@@ -16,8 +16,8 @@ import pytest
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import native, rigid_links, stiff_steps, tube_table, two_links
-from spirillum.kernels.tube_table import contact_offset, film_coordinates, spline_weights
+from spirillum.kernels import core, native, rigid_links, two_links
+from spirillum.kernels.core import contact_offset, film_coordinates, spline_weights
 
 BUILD = Path(__file__).parents[2] / "csrc" / "build.py"
 
@@ -58,13 +58,13 @@ def test_every_build_finds_the_same_numbers(strict: Path, wide: Any, monkeypatch
     found = []
     for path in (native.library()._name, str(strict)):
         monkeypatch.setattr(native, "library", partial(ctypes.CDLL, path))
-        resistance_at, rates = (runpy.run_path(module.__file__) for module in (tube_table, stiff_steps))
+        stubs = runpy.run_path(core.__file__)
         numbers = []
         for pose, state in zip(poses, states, strict=True):
             matrix, change = np.empty((8, 8)), np.empty(rigid_links.STATES)
-            resistance_at["resistance_at"](packed, *pose, matrix)
+            stubs["resistance_at"](packed, *pose, matrix)
             data = two_links.packed(*links, np.zeros((0, 6)), drive)
-            rates["rates"](change, 0.7, state, data, np.zeros(0))
+            stubs["rates"](change, 0.7, state, data, np.zeros(0))
             numbers.append(np.concatenate([matrix.ravel(), change]))
         found.append(numbers)
     np.testing.assert_array_equal(*found)

@@ -4,21 +4,19 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from spirillum.kernels.edges import (
+from spirillum.kernels.core import (
     edge_places,
     edge_points,
-    profiles_across,
-    robust_change,
-    shifts_of_profiles,
-    sums_along,
-)
-from spirillum.kernels.pictures import (
     profile_of_rows,
+    profiles_across,
     ridge_of,
+    robust_change,
     sampled,
+    shifts_of_profiles,
     stripe_edges,
     stripe_fit,
     stripes_at,
+    sums_along,
     wave_fit,
     wave_scores,
 )

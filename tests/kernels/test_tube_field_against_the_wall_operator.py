@@ -5,7 +5,7 @@ import pytest
 from scipy.special import k0e, k1e
 
 from spirillum.fluid.tube.wall import point_reflection, waves_between
-from spirillum.kernels.stokes_flow import add_waves, wave_amplitudes
+from spirillum.kernels.core import add_waves, wave_amplitudes
 
 R = 0.02
 RNG = np.random.default_rng(4)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ive, k0e, k1e
 
-from spirillum.kernels.stokes_flow import (
+from spirillum.kernels.core import (
     circle_waves,
     point_waves,
     ring_blocks,

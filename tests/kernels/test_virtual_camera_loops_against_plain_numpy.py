@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.kernels.rendering import blend, develop, draw, shade, still_picture
+from spirillum.kernels.core import blend, develop, draw, shade, still_picture
 from spirillum.virtual.optics import VirtualLens, spots
 
 EMPTY = np.float32(-1e30)

@@ -21,7 +21,8 @@ from spirillum.dynamics.run_file import robot_of
 from spirillum.fluid.tube.library import tables_of
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import rigid_links as links
-from spirillum.kernels.tube_table import film_at, film_start, resistance_at
+from spirillum.kernels.core import film_at, resistance_at
+from spirillum.kernels.tube_table import film_start
 from spirillum.robot.batch import RobotBatch
 
 REFERENCE = 20e-6

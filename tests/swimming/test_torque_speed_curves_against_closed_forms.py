@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.kernels.motor import curve_torques
+from spirillum.kernels.core import curve_torques
 from spirillum.robot.robot import robot_text
 from spirillum.robot.tables import TorqueCurve
 from spirillum.swimming.drives import packed_curve

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.kernels.rendering import draw
+from spirillum.kernels.core import draw
 from spirillum.robot.surface import mass_properties
 from spirillum.virtual.optics import VirtualLens, backdrop, spots, tank_of
 from spirillum.virtual.pictures import Painter

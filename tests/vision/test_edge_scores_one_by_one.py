@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.kernels.edges import edge_scores
+from spirillum.kernels.core import edge_scores
 
 RUN = 6
 

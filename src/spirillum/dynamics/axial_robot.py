@@ -32,8 +32,10 @@ from spirillum.dynamics.run_summary import STEADY, run_averages, stretches_on
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.errors import InputError
 from spirillum.fitted.fit import read_fit
+from spirillum.kernels import core
 from spirillum.kernels import motor as kernel
-from spirillum.kernels.motor import MOTOR, steady_currents, windings
+from spirillum.kernels.core import steady_currents, windings
+from spirillum.kernels.motor import MOTOR
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
@@ -167,9 +169,9 @@ class AxialRobot:
     ) -> None:
         """Take robots with its motor over a time; arguments as of `kernels.motor.advance`."""
         if self.curve is None:
-            kernel.advance(numbers, states, dt, duty, flow, fineness)
+            core.advance_axial(numbers, states, dt, duty, flow, fineness)
         else:
-            kernel.advance_on_curve(numbers, states, dt, duty, flow, self.curve)
+            core.advance_on_curve(numbers, states, dt, duty, flow, self.curve)
 
     def steady_current(self, numbers: Samples, duty: float, flow: float) -> float:
         """Current at which it no longer changes, A; the torque of a motor with a curve, N m."""
@@ -249,7 +251,7 @@ def outputs(p: Samples, states: Samples, duty: Any, flow: Any) -> Samples:
 def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
     """d/dt of the state and its two integrals, (7,), by the robot's numbers, current, duty and imposed mean flow."""
     found = np.empty(kernel.STATES)
-    kernel.rates(p, current, duty, flow, found)
+    core.axial_rates(p, current, duty, flow, found)
     return found
 
 

@@ -29,7 +29,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.film_surface import FilmBody
-from spirillum.kernels import rigid_links, stiff_steps
+from spirillum.kernels import core, rigid_links
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
@@ -199,13 +199,13 @@ class FreeRobot(ABC):
     def observe(self, time: Samples, states: Samples) -> Samples:
         """What is observed in states, (n, 19), at times, s: (n, 13), or (n, 31) in a tube."""
         out = np.empty((time.size, self.observed))
-        stiff_steps.observe(time, states, self.data, self.table, out)
+        core.observe(time, states, self.data, self.table, out)
         return out
 
     def gaps(self, state: Samples) -> Samples:
         """Gaps that are watched in a state, (19,), m: at every site, and last the smallest of the wire, in a tube."""
         found = np.empty(self.gap_count)
-        stiff_steps.gaps_of(state, self.data, self.table, found)
+        core.gaps_of(state, self.data, self.table, found)
         return found
 
     def at_duty(self: _Robot, duty: float) -> _Robot:

@@ -19,7 +19,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
-from spirillum.kernels import rigid_links, stiff_steps
+from spirillum.kernels import core, rigid_links, stiff_steps
 
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
@@ -202,7 +202,7 @@ def _stretch(
     robot = run.robot.at_duty(duty).between(run.time, stop)
     data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
     outside = float(observed_at(robot, run.state)[rigid_links.OUTSIDE]) if robot.table.size else 0.0
-    stiff_steps.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
+    core.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, rigid_links.STATES))
     sizes, done = run_sizes(robot), 0
     events: list[Event] = []
@@ -211,7 +211,7 @@ def _stretch(
     try:
         while True:
             watched = run.gaps.copy()
-            status = stiff_steps.advance(
+            status = core.advance(
                 target, clip, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments,
                 run.jacobian, run.gaps, inside[done:], states[done:], sizes, limits, robot.roughness, data,
                 robot.table,
@@ -248,12 +248,12 @@ def _crossed(
     dy = np.empty(rigid_links.STATES)
 
     def at(index: int, share: float) -> float:
-        stiff_steps.interpolate(share, run.before, new, run.increments, inner)
+        core.interpolate(share, run.before, new, run.increments, inner)
         outside = 0.0
         if index == gaps.size - stiff_steps.WATCHED + stiff_steps.INSIDE:
-            stiff_steps.rates(dy, begin + share * length, inner, data, robot.table)
+            core.rates(dy, begin + share * length, inner, data, robot.table)
             outside = float(data[rigid_links.OUTSIDE])
-        stiff_steps.watched(inner, outside, data, robot.table, limits, robot.roughness, gaps)
+        core.watched(inner, outside, data, robot.table, limits, robot.roughness, gaps)
         return float(gaps[index])
 
     crossed = np.flatnonzero((watched > 0) != (run.gaps > 0)).tolist()

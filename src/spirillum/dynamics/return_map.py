@@ -19,7 +19,7 @@ from spirillum.dynamics.integration import Reach, observed_at, watched_limits
 from spirillum.dynamics.start import state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
-from spirillum.kernels import rigid_links, stiff_steps
+from spirillum.kernels import core, rigid_links, stiff_steps
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.contacts import SITE_ROTOR
 
@@ -99,13 +99,13 @@ class ReturnMap:
         memory[stiff_steps.STEP] = _FIRST * robot.turn
         gaps = np.ones(robot.gap_count + stiff_steps.WATCHED)
         increments, before, jacobian = np.zeros((8, rigid_links.STATES)), y.copy(), np.zeros((8, 8))
-        stiff_steps.watched(y, 0.0, data, robot.table, limits, robot.roughness, gaps)
+        core.watched(y, 0.0, data, robot.table, limits, robot.roughness, gaps)
         nothing, none = np.empty(0), np.empty((0, rigid_links.STATES))
         begun = observed_at(robot, y)[kernel.TURN], y[rigid_links.PHASE]
         noted: list[tuple[float, ...]] = []
         jacobians: list[Samples] = []
         while self._turned(y, data[kernel.TURN], begun) < 2.0 * np.pi or not noted:
-            status = stiff_steps.advance(
+            status = core.advance(
                 np.inf, _ON, 1, self.tolerance, memory, y, before, increments, jacobian, gaps, nothing, none,
                 sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
@@ -149,7 +149,7 @@ class ReturnMap:
         inner = np.empty(rigid_links.STATES)
 
         def left(share: float) -> float:
-            stiff_steps.interpolate(share, before, new, increments, inner)
+            core.interpolate(share, before, new, increments, inner)
             return self._turned(inner, observed_at(self.robot, inner)[kernel.TURN], begun) - 2.0 * np.pi
 
         share = float(brentq(left, 0.0, 1.0, xtol=1e-13))
@@ -327,7 +327,7 @@ class _Chart:
             return None
         self.current = float(turn.state[rigid_links.CURRENT])
         rates = np.empty(rigid_links.STATES)
-        stiff_steps.rates(rates, 0.0, turn.state, self._robot.data, self._robot.table)
+        core.rates(rates, 0.0, turn.state, self._robot.data, self._robot.table)
         after, rate = self._chart_derivative(turn.state), rates[list(stiff_steps.ACTING)]
         moved = after @ turn.tangent @ np.linalg.inv(self._chart_derivative(start))[:, :4]
         drift = after @ rate  # the turn ends where the tail is at its angle again

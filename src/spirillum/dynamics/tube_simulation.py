@@ -23,7 +23,8 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.table import BELOW, TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import MOTIONS, largest_yaw, range_of, resistance_at
+from spirillum.kernels.core import largest_yaw, resistance_at
+from spirillum.kernels.tube_table import MOTIONS, range_of
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot

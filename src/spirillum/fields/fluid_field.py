@@ -101,7 +101,7 @@ def add_tractions(
     Tractions are those of the panels' modes, (panels, p, modes, 3); velocity and pressure, (n, 4), are without the
     factors 1/(8 pi mu) and 1/(8 pi).
     """
-    from spirillum.kernels.stokes_flow import add_blobs, add_layer, add_moments
+    from spirillum.kernels.core import add_blobs, add_layer, add_moments
 
     start = 0
     for wire in wires:

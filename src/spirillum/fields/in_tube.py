@@ -185,7 +185,7 @@ class _Reflection:
         """Add up the waves of all forces at the stations and of the tractions on the panels of the solids."""
         from scipy.special import k0e, k1e
 
-        from spirillum.kernels.stokes_flow import wave_amplitudes
+        from spirillum.kernels.core import wave_amplitudes
 
         seat, tolerance = strengths.solids.pose, strengths.solids.fineness.tolerance
         cut = -float(np.log(tolerance))
@@ -221,7 +221,7 @@ class _Reflection:
 
     def field(self, placed: Samples) -> Samples:
         """Velocity and pressure at points about the tube's axis, in its axes, (n, 4)."""
-        from spirillum.kernels.stokes_flow import add_waves
+        from spirillum.kernels.core import add_waves
 
         field = np.zeros((len(placed), 4))
         distance = np.maximum(self.radius - np.hypot(placed[:, 1], placed[:, 2]), 0.0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.kernels.rendering import film_colours
+from spirillum.kernels.core import film_colours
 from spirillum.optional_dependencies import import_optional
 
 ENCODERS = ("libx264", "libopenh264", "h264")  #: Encoders of H.264, best first, as far as the build of PyAV has them.

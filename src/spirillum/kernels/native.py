@@ -1,8 +1,8 @@
-"""How Python calls the loops that are written in C (csrc/): by stubs whose annotations are the contract.
+"""How Python calls the loops that are written in C (csrc/): by the stubs of `core`, whose annotations are the contract.
 
-A stub has the name, the parameters and the documentation of a function of csrc/. Arrays are annotated with their dtype
-and shape (`Float64[Array, "n 8 8"]`); a named dimension has one length in all arguments of a call, and C gets the
-lengths behind the arguments, in the order in which their names first appear. `"..."` is an array of any shape.
+Arrays are annotated with their dtype and shape (`Float64[Array, "n 8 8"]`); a named dimension has one length in all
+arguments of a call, and C gets the lengths behind the arguments, in the order in which their names first appear. An
+array of any shape has `"..."`.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ __all__ = [
     "thread_count",
 ]
 
-_SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_int64}
+_SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_bool}
 _THREADS = int(os.environ.get("OMP_NUM_THREADS") or 0) or os.cpu_count() or 1
 _SHARES = 4
 """Shares of the rows for each thread: some rows take longer than others."""
@@ -100,28 +100,27 @@ def sources_digest() -> str:
     return cast("bytes", function()).decode()
 
 
-def native(*written: str, rows: str = "", symbol: str = "") -> Callable[[_F], _F]:
-    """Turn a stub into a call of the C function of its name, or of `symbol`.
+def native(*written: str, rows: str = "") -> Callable[[_F], _F]:
+    """Turn a stub into a call of the C function of its name.
 
     Args:
         written: names of the arrays that the function writes to: these have to have the dtype of their annotation and
             be contiguous; others are copied where they are not.
         rows: a dimension, the first one of its arrays, over which threads may share the work.
-        symbol: name of the function in C, where another file has a stub of this name too.
     """
 
     def decorate(stub: _F) -> _F:
-        @cache
-        def prepared() -> _Call:
-            return _Call(stub, symbol or stub.__name__, frozenset(written), rows)
+        count = stub.__code__.co_argcount
+        prepared: _Call | None = None
 
         @wraps(stub)
         def call(*arguments: Any, **keywords: Any) -> Any:
-            if keywords or len(arguments) < stub.__code__.co_argcount:
-                bound = inspect.signature(stub).bind(*arguments, **keywords)
-                bound.apply_defaults()
-                arguments = bound.args
-            return prepared()(arguments)
+            nonlocal prepared
+            if keywords or len(arguments) != count:
+                arguments = inspect.signature(stub).bind(*arguments, **keywords).args
+            if prepared is None:
+                prepared = _Call(stub, frozenset(written), rows)
+            return prepared(arguments)
 
         return cast("_F", call)
 
@@ -160,20 +159,15 @@ def rows_in_one_thread() -> Iterator[None]:
         _alone.reset(token)
 
 
-_byref: Callable[[Any], Any] = ctypes.byref
-_first_byte: Callable[[Any], Any] = ctypes.c_char.from_buffer
+_FIRST_BYTE: Callable[[Any], Any] = (ctypes.c_char * 1).from_buffer
 
 
 def _pointer(array: np.ndarray[Any, Any]) -> Any:
     """Return what ctypes takes as a pointer to the first element; three times as fast where the array is writable."""
     try:
-        return _byref(_first_byte(array))
+        return _FIRST_BYTE(array)
     except (TypeError, ValueError):  # of a read-only or an empty one
         return array.ctypes.data
-
-
-_PASSED: dict[Any, Callable[[Any], Any]] = {float: float, int: int, bool: int}
-"""What ctypes takes for a number."""
 
 
 class _ArrayArgument:
@@ -207,29 +201,26 @@ class _ArrayArgument:
 class _Call:
     """A function of the library with the checks of its arguments."""
 
-    def __init__(self, stub: Callable[..., Any], symbol: str, written: frozenset[str], rows: str) -> None:
+    def __init__(self, stub: Callable[..., Any], written: frozenset[str], rows: str) -> None:
         hints = get_type_hints(stub, include_extras=True)
         returned = hints.pop("return")
-        self._arguments = [
-            None if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)
+        self._kinds = [
+            hint if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)
             for name, hint in hints.items()
         ]
-        self._arrays = [argument for argument in self._arguments if argument]
-        names = [size for argument in self._arrays for size in argument.shape or ()]
+        self._arrays = [(n, kind) for n, kind in enumerate(self._kinds) if isinstance(kind, _ArrayArgument)]
+        names = [size for _, kind in self._arrays for size in kind.shape or ()]
         self._names = tuple(dict.fromkeys(name for name in names if isinstance(name, str)))
         self._rows = rows
-        self._function: Any = library()[symbol]
+        self._function: Any = library()[stub.__name__]
         self._function.restype = _SCALARS.get(returned)
         passed: list[Any] = [_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()]
         self._function.argtypes = passed + [ctypes.c_int64] * len(self._names)
-        self._places = [(n, argument) for n, argument in enumerate(self._arguments) if argument]
-        self._numbers = [(n, _PASSED[hint]) for n, hint in enumerate(hints.values()) if hint in _PASSED]
-        self._is_truth = returned is bool
         self._last: tuple[list[tuple[int, ...]], _Sizes] | None = None
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:
         values, shapes = list(arguments), []
-        for n, expected in self._places:
+        for n, expected in self._arrays:
             value = values[n]
             # Most arrays are as they should be: dtypes of one kind are one object.
             if not (type(value) is np.ndarray and value.dtype is expected.dtype and value.flags.c_contiguous):
@@ -246,7 +237,7 @@ class _Call:
         if last is not None and last[0] == shapes:
             return last[1]
         sizes: _Sizes = {}
-        for expected, shape in zip(self._arrays, shapes, strict=True):
+        for (_, expected), shape in zip(self._arrays, shapes, strict=True):
             expected.add_sizes(shape, sizes)
         sizes = {name: sizes[name] for name in self._names}
         self._last = shapes, sizes
@@ -254,20 +245,23 @@ class _Call:
 
     def _run(self, values: list[Any], sizes: _Sizes) -> Any:
         passed = values.copy()
-        for n, _ in self._places:
+        for n, _ in self._arrays:
             passed[n] = _pointer(values[n])
-        for n, number in self._numbers:
-            passed[n] = number(values[n])
-        result = self._function(*passed, *sizes.values())
-        return bool(result) if self._is_truth else result
+        try:
+            return self._function(*passed, *sizes.values())
+        except ctypes.ArgumentError:  # numbers of NumPy that ctypes does not know
+            numbers = [
+                kind(value) if kind in _SCALARS else value for kind, value in zip(self._kinds, passed, strict=True)
+            ]
+            return self._function(*numbers, *sizes.values())
 
     def _run_in_threads(self, values: list[Any], sizes: _Sizes) -> None:
         """Let threads share the rows of the arrays whose first dimension has this name."""
         count = sizes[self._rows]
-        shared = [argument is not None and (argument.shape or ("",))[0] == self._rows for argument in self._arguments]
+        cut = [n for n, kind in self._arrays if (kind.shape or ("",))[0] == self._rows]
 
         def run(low: int, high: int) -> None:
-            part = [value[low:high] if cut else value for value, cut in zip(values, shared, strict=True)]
+            part = [value[low:high] if n in cut else value for n, value in enumerate(values)]
             self._run(part, sizes | {self._rows: high - low})
 
         edges = np.linspace(0, count, min(_SHARES * _THREADS, count) + 1).astype(int).tolist()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from spirillum.kernels.native import Array, Float64, native
-
 # The state.
 POSITION, ATTITUDE = 0, 3  # of the origin in the lab, m; unit quaternion (w, x, y, z), body axes to lab
 PHASE, ROLL = 7, 8  # tail angle phi against the body; integral of Omega_x, rad
@@ -38,8 +36,3 @@ MOTOR, TORQUE, RATE, MAGNETIC, CURVE = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds
 # Weight: submerged weight of body and rotor, N, and first moments of the rest, N m, at phase 0.
 WEIGHT_BODY, WEIGHT_ROTOR, MOMENT_BODY, MOMENT_ROTOR = 0, 1, 2, 5
 WEIGHT = 8
-
-
-@native("out")
-def field_at(time: float, drive: Float64[Array, "48"], out: Float64[Array, "3"]) -> None:
-    """Fill the field in the lab at a time, s, in T: it turns about its axis, at right angles to it."""

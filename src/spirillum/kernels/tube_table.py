@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.native import Array, Float64, Int64, native
+from spirillum.kernels.core import contact_offset_of, largest_yaw, stretched_yaw
 
 # Columns of the head of a packed table.
 TUBE, BODY, HALF = 0, 1, 2  # R, a and a spheroid's half-length (0: a straight side), m
@@ -57,77 +57,6 @@ def film_is_whole(film: Samples, radius: float) -> bool:
         return False
     values = film[HEAD:].view(np.float32)  # one more where their number is odd
     return values.size - math.prod(shape_of(film)) in (0, 1) and bool(np.isfinite(values).all())
-
-
-@native()
-def clearance(
-    head: Float64[Array, "..."],  # head of a packed table
-    x: float,  # place on the body's axis
-    half: float,  # half-length of the spheroid, 0 for a ring
-    ring: float,  # radius of the ring or spheroid
-    rounded: float,  # radius of the ball that runs around on the ring
-    e: float,  # offset of the body's middle
-    lift: float,  # component of the body's axis towards the tube's axis
-    side: float,  # component of the body's axis to the side
-) -> float:
-    """Depth by which a ring, or a spheroid, may sink until it touches the wall, m."""
-
-
-@native()
-def smallest_gap(head: Float64[Array, "..."], e: float, p: float, psi: float) -> float:
-    """Smallest distance between a body and the wall, m; `head` may be a packed table."""
-
-
-@native()
-def stretched(v: float, radius: float) -> float:
-    """Coordinate of a clearance: its logarithm where it is small against the radius, and finer about the radius."""
-
-
-@native()
-def yaw_scale(head: Float64[Array, "..."], rear: float, front: float) -> float:
-    """Sine of the yaw at which the wall's curvature under the straight side counts, from the clearances of its ends."""
-
-
-@native("out")
-def film_coordinates(head: Float64[Array, "..."], e: float, p: float, psi: float, out: Float64[Array, "5"]) -> None:
-    """Write what the interpolation of a film goes by at a place; `head` may be a packed table.
-
-    Three coordinates; the part of log D of the first motion that is known in closed form; and the angle from z' to
-    the normal of the wall, where a rounded end is nearest.
-    """
-
-
-@native("out")
-def spline_weights(at: float, first: float, last: float, intervals: int, out: Float64[Array, "4"]) -> int:
-    """Weights of the four cubic B-splines at a place, and the number of their first; a straight line outside."""
-
-
-@native("out")
-def film_at(
-    packed: Float64[Array, "..."],  # a film's table, packed
-    e: float,  # offset of the body's middle from the tube's axis, m, at least 0
-    p: float,  # pitch, rad, positive where the nose points away from the wall
-    psi: float,  # yaw, rad
-    out: Float64[Array, "6 6"],  # (6, 6), the result
-) -> float:
-    """Write the film's resistance (6x6, per viscosity, in F about the body's middle); the body's smallest gap, m.
-
-    Outside of the table the film goes on: as power laws below its thinnest clearances, unchanged beyond its largest
-    yaw. Where the body touches the wall, the clearances are 1e-12 of its radius, and the gap is negative.
-    """
-
-
-@native("out")
-def lift_of_cavitation(
-    gap: Float64[Array, "count"],  # smallest gaps h0, m
-    bend: Float64[Array, "count"],  # R' of the gaps h0 + x^2/(2 R'), m
-    opening: Float64[Array, "count"],  # V = dh0/dt, m/s
-    entrainment: Float64[Array, "count"],  # u, mean velocity of both surfaces as seen from the contact line, m/s
-    viscosity: float,  # Pa s
-    bound: float,  # p_c, the pressure is not below -p_c, Pa
-    out: Float64[Array, "count 6"],  # force that opens the gap, force that works on u, their derivatives in V, and in u
-) -> None:
-    """Fill what the bound of the pressure adds to the forces of line contacts, per length, N/m."""
 
 
 MOTIONS = 8
@@ -289,38 +218,6 @@ def mirror_image(table: Samples) -> Samples:
     return parts._replace(rest=parts.rest * signs, yawed=parts.yawed * signs * yaws).packed()
 
 
-@native()
-def contact_offset(rings: Float64[Array, "count 4"], radius: float, pitch: float) -> float:
-    """Offset e_c at which a body without yaw touches the floor of the tube, m.
-
-    The body is the hull of rings about its axis, each the centre of an ellipse: (x, rho, semi-axis along, across), m.
-    """
-
-
-@native()
-def contact_offset_of(table: Float64[Array, "..."], pitch: float) -> float:
-    """Offset at which the body of a packed table touches the floor of the tube without a yaw, m."""
-
-
-@native()
-def cut_of_film(t: float) -> float:
-    """Share w of the film at t: 1 at contact, 0 on the axis, where no side is the nearer one."""
-
-
-@native()
-def largest_yaw(table: Float64[Array, "..."], e: float, pitch: float) -> float:
-    """Largest yaw to either side at a place, rad: the table's nodes reach up to 0.95 of it."""
-
-
-@native()
-def limited_yaw(
-    limit: Float64[Array, "7"],  # of `yaw_limit_of`
-    x: float,  # offset of the body's mid-length over R
-    pitch: float,  # nose up, rad
-) -> float:
-    """Largest yaw at a place, rad."""
-
-
 def yaw_limit_of(x: Samples, pitches: Samples, yaws: Samples, most: float) -> Samples:
     """The numbers of `limited_yaw`, (7,), from largest yaws at some places.
 
@@ -335,11 +232,6 @@ def yaw_limit_of(x: Samples, pitches: Samples, yaws: Samples, most: float) -> Sa
     return np.append(np.linalg.lstsq(terms, np.sin(yaws) ** 2, rcond=None)[0], most)
 
 
-@native()
-def stretched_yaw(share: float) -> float:
-    """What the outer part is a polynomial of: what nears the glass varies as the logarithm of its clearance."""
-
-
 def yaw_parts_at_nodes() -> Samples:
     """Odd and then even part of what a yaw adds at its nodes, from the coefficients of its powers, (orders, orders).
 
@@ -352,49 +244,8 @@ def yaw_parts_at_nodes() -> Samples:
     return found
 
 
-@native("out")
-def outer_coefficients(table: Float64[Array, "..."], e: float, pitch: float, out: Float64[Array, "phases 36"]) -> None:
-    """Fill the Fourier coefficients of the outer part's factor at a place without yaw, (phases, 36)."""
-
-
 def film_start(table: Samples) -> int:
     """Where in a packed table the film begins."""
     own = 4 * table[_RINGS] + 3 * table[_GAPS] + table[_UP] + table[_DOWN] + table[_YAW_GAPS] + table[_YAW_PITCHES]
     outer, yawed = shapes_of(table)
     return _HEADER + int(own) + _YAW_LIMIT + math.prod(outer) + math.prod(yawed)
-
-
-@native("out")
-def resistance_at(
-    table: Float64[Array, "..."], e: float, pitch: float, yaw: float, phase: float, out: Float64[Array, "8 8"]
-) -> int:
-    """Fill the symmetric 8x8 of a place, viscosity 1, in the robot's axes without roll; how the table's range was left.
-
-    Returns:
-        `INSIDE`, or which range was left; then the answer is that of the nearest place inside.
-    """
-
-
-@native("out")
-def mean_resistance_at(
-    table: Float64[Array, "..."],  # from `packed`
-    e: float,  # offset of the body's mid-length from the tube's axis, m
-    pitch: float,  # nose up, away from the near wall, rad
-    yaw: float,  # nose to the side, rad
-    phases: int,  # number of phases, evenly spaced
-    out: Float64[Array, "8 8"],
-) -> int:
-    """Fill the 8x8 of a place, averaged over phases of the tail; arguments as `resistance_at`."""
-
-
-@native("out")
-def mean_resistances(
-    tables: Float64[Array, "rows size"],  # packed tables, one in each row, see `packed`
-    which: Int64[Array, "count"],  # row of each place's table
-    gap: Float64[Array, "count"],  # smallest distances between body and wall, m
-    pitch: Float64[Array, "count"],  # nose up, rad
-    yaw: Float64[Array, "count"],  # nose to the side, rad
-    phases: int,  # number of phases, evenly spaced
-    out: Float64[Array, "count 8 8"],
-) -> None:
-    """Fill the 8x8 at many places, averaged over the tail's phase, viscosity 1; NaN outside the table."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.native import Array, Float64, native
 from spirillum.kernels.rigid_links import SEEN
 
 # The wall.
@@ -30,15 +29,3 @@ def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spo
         drive: drive and motor, (48,).
     """
     return np.concatenate([np.ravel(part) for part in (np.zeros(SEEN), friction, weight, drive, drag, wall, spots)])
-
-
-@native("j")
-def film_of(
-    y: Float64[Array, "19"],
-    rotation: Float64[Array, "3 3"],
-    wall: Float64[Array, "4"],
-    spot: Float64[Array, "6"],
-    j: Float64[Array, "6"],
-) -> float:
-    """Return the film between the wall and the surface about one ring of the robot, m; fill its loss per rate."""
-    raise NotImplementedError

@@ -11,7 +11,8 @@ from pydantic import model_validator
 
 from spirillum.data_tables import rows_of
 from spirillum.files import MARK
-from spirillum.kernels.motor import CONSTANT, MOTOR, SLOPE, windings
+from spirillum.kernels.core import windings
+from spirillum.kernels.motor import CONSTANT, MOTOR, SLOPE
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import default_of, field_values, refuse
 from spirillum.robot.limits import assembly_limits, broken

@@ -13,7 +13,8 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Samples, Values
 from spirillum.errors import InputError
-from spirillum.kernels.motor import MOST_POINTS, MOTOR, curve_torques, steady_currents, windings
+from spirillum.kernels.core import curve_torques, steady_currents, windings
+from spirillum.kernels.motor import MOST_POINTS, MOTOR
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.tables import FrictionReading, TorqueCurve
 from spirillum.swimming.balance import (

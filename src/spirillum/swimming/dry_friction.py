@@ -20,7 +20,7 @@ import numpy as np
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, MeanFlow, PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
-from spirillum.kernels.motor import contact_drag
+from spirillum.kernels.core import contact_drag
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.links import links_of

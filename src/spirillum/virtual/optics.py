@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.kernels.rendering import project, sightlines, still_picture
+from spirillum.kernels.core import project, sightlines, still_picture
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.virtual.solids import linear

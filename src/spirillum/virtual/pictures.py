@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.rendering import blend, develop, draw
+from spirillum.kernels.core import blend, develop, draw
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.virtual.artifacts import ViewArtifacts

@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.kernels.rendering import shade
+from spirillum.kernels.core import shade
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot

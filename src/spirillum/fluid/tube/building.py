@@ -46,8 +46,10 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable, finest_wire
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels import core
 from spirillum.kernels import tube_table as kernel
-from spirillum.kernels.tube_table import MOTIONS, film_at
+from spirillum.kernels.core import film_at
+from spirillum.kernels.tube_table import MOTIONS
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import TubePose
 
@@ -359,7 +361,7 @@ def _yawed_poses(places: Places) -> list[TubePose]:
 def _interpolated(straight: Samples, pose: TubePose, count: int) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, interpolated from the table without yaw."""
     out = np.empty((count, kernel.PARAMETERS))
-    kernel.outer_coefficients(straight, pose.offset, pose.pitch, out)
+    core.outer_coefficients(straight, pose.offset, pose.pitch, out)
     return out
 
 
@@ -390,7 +392,7 @@ def _largest_errors(
         (_, phases), pose = check.tails[0], check.pose
         found = np.empty((len(phases) + PHASES, kernel.MOTIONS, kernel.MOTIONS))
         for phase, out in zip((*phases, *even_phases()), found, strict=True):
-            kernel.resistance_at(table, pose.offset, pose.pitch, pose.yaw, phase, out)
+            core.resistance_at(table, pose.offset, pose.pitch, pose.yaw, phase, out)
         turn = found[len(phases) :]
         errors += [response_errors(own, true, turn) for own, true in zip(found, answers[0], strict=False)]
     return dict(zip(RESPONSES, np.max(errors, axis=0).tolist(), strict=True))

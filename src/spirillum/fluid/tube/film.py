@@ -36,6 +36,7 @@ from scipy.linalg import cholesky, solve_triangular
 from spirillum.arrays import Matrix6, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film_surface import TOUCHES, Cuts, FilmBody, FilmSurface, Place, film_surface, frame
+from spirillum.kernels import core
 from spirillum.kernels import tube_table as table
 from spirillum.robot.outline import Outline
 
@@ -242,7 +243,7 @@ class FilmTable:
                 for k, eta in enumerate(etas):
                     e, p, psi = _off_the_wall(body, radius, *_place_of(head, first, second, eta))
                     found = np.empty(5)
-                    table.film_coordinates(head, e, p, psi, found)
+                    core.film_coordinates(head, e, p, psi, found)
                     nodes[i, j, k] = _factors(resistance_of(body, radius, e, p, psi), body.radius, found[4])
                     nodes[i, j, k, 0] -= found[3]
             if step is not None:
@@ -260,7 +261,7 @@ class FilmTable:
     def at(self, e: float, p: float, psi: float) -> tuple[Matrix6, float]:
         """Resistance at a pose, as of `film_resistance`, and the body's smallest gap, m."""
         out = np.empty((6, 6))
-        return out, float(table.film_at(self.packed, e, p, psi, out))
+        return out, float(core.film_at(self.packed, e, p, psi, out))
 
 
 def _yaw_nodes(count: int) -> Samples:
@@ -283,8 +284,8 @@ def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: in
     head = np.zeros(table.HEAD)
     head[:7] = radius, a, body.half, *body.rear, *body.front
     widest = min(2.0 * (radius - a), radius - a + np.sin(pitch) * reach)
-    head[table.FIRST] = table.stretched(_THINNEST * a, a)
-    head[table.LAST] = table.stretched(widest, a)
+    head[table.FIRST] = core.stretched(_THINNEST * a, a)
+    head[table.LAST] = core.stretched(widest, a)
     head[table.INTERVALS] = head[table.SECOND_INTERVALS] = intervals
     head[10:12] = (-_SPHEROID_PITCH, _SPHEROID_PITCH) if body.half else head[7:9]
     room = 1.0 if reach == 0 else min(0.6 * (radius - a) / reach, 1.0)
@@ -296,7 +297,7 @@ def _clearance_of(at: float, radius: float) -> float:
     """Inverse of `stretched`."""
     v = 1e-4 * radius
     for _ in range(100):
-        error = table.stretched(v, radius) - at
+        error = core.stretched(v, radius) - at
         if abs(error) < 1e-13:
             break
         v *= np.exp(-error / (1.0 + 2.0 * v / (radius + v)))
@@ -310,11 +311,11 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
         psi = float(np.arcsin(np.sinh(eta * np.arcsinh(np.sin(head[table.YAW])))))
         e, wanted = 0.0, _clearance_of(first, a)
         for _ in range(4):
-            e += table.clearance(head, rear, half, a, 0.0, e, np.sin(second), np.cos(second) * np.sin(psi)) - wanted
+            e += core.clearance(head, rear, half, a, 0.0, e, np.sin(second), np.cos(second) * np.sin(psi)) - wanted
         return e, float(second), psi
     length = front - rear
     v = np.array([_clearance_of(first, a), _clearance_of(second, a)])
-    scale = table.yaw_scale(head, *v)
+    scale = core.yaw_scale(head, *v)
     sine = scale * np.sinh(eta * np.arcsinh(np.sin(head[table.YAW]) / scale))
     v = np.minimum(v, v.min() + _STEEPEST * length)
 
@@ -350,7 +351,7 @@ def _clearances(head: Samples, e: float, lift: float, sine: float) -> Samples:
     _, a, _, rear, rear_round, front, front_round = head[:7]
     side = float(np.sqrt(1.0 - lift**2) * sine)
     ends = ((rear, rear_round), (front, front_round))
-    return np.array([table.clearance(head, x, 0.0, a - f, f, e, lift, side) for x, f in ends])
+    return np.array([core.clearance(head, x, 0.0, a - f, f, e, lift, side) for x, f in ends])
 
 
 def _factors(resistance: Matrix6, a: float, angle: float) -> Samples:
@@ -370,6 +371,6 @@ def _collocated(places: Samples, low: float, high: float) -> Samples:
     count = places.size
     matrix, weights = np.zeros((count, count)), np.empty(4)
     for row, place in enumerate(places):
-        start = table.spline_weights(place, low, high, count - 3, weights)
+        start = core.spline_weights(place, low, high, count - 3, weights)
         matrix[row, start : start + 4] = weights
     return matrix

@@ -21,7 +21,8 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import STEEPEST, YAW_SHARES, contact_offset, limited_yaw, yaw_limit_of
+from spirillum.kernels.core import contact_offset, limited_yaw
+from spirillum.kernels.tube_table import STEEPEST, YAW_SHARES, yaw_limit_of
 from spirillum.robot.outline import Arc, Outline, Segment, Smooth
 from spirillum.robot.tube_pose import TubePose, last_clear
 from spirillum.units import show

@@ -127,7 +127,7 @@ class LevelRings(Rings):
 
     def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
-        from spirillum.kernels.stokes_flow import subtract_block
+        from spirillum.kernels.core import subtract_block
 
         at_nodes, averages = self._strengths(waves), self._strengths(waves, averaged=True)
         between = self._matrices(waves)
@@ -203,7 +203,7 @@ class LevelRings(Rings):
 
     def _traces(self, waves: WallWaves, number: int) -> tuple[Samples, Samples]:
         """Even and odd waves of one k as modes on the reference cylinder, (modes, 3, orders, 3) each."""
-        from spirillum.kernels.stokes_flow import circle_waves
+        from spirillum.kernels.core import circle_waves
 
         orders = waves.orders[number]
         theta = midpoints(max(waves.orders), self.modes)

@@ -31,7 +31,7 @@ from spirillum.fluid.tube.nodes import CHECKED_FROM
 from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR, RESPONSES, SOLIDS_ERROR, STAGES, StageName
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
-from spirillum.kernels import tube_table
+from spirillum.kernels import core, tube_table
 from spirillum.robot.tail_form import PLAIN
 
 _REST = 3e-6
@@ -217,7 +217,7 @@ class TubeTable:
             phase: of the tail, rad.
         """
         out = np.empty((tube_table.MOTIONS, tube_table.MOTIONS))
-        left = tube_table.resistance_at(self.packed, offset, pitch, yaw, phase, out)
+        left = core.resistance_at(self.packed, offset, pitch, yaw, phase, out)
         return out, int(left)
 
     def error_at(self, yaw: float) -> Mapping[str, float]:

@@ -105,7 +105,7 @@ class TiltedRings(Rings):
 
     def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
-        from spirillum.kernels.stokes_flow import subtract_block
+        from spirillum.kernels.core import subtract_block
 
         tiers = self._tiers(waves, systems)
         # What plain tiers and others do to each other is symmetric; the waves of averaged ones are averaged both ways.
@@ -256,7 +256,7 @@ class TiltedRings(Rings):
         Over even, odd; component; ring; order; real, imaginary; wall component; angle. `placed`: points on the arcs
         about the tube's axis, (rings, angles, 3), m.
         """
-        from spirillum.kernels.stokes_flow import ring_waves, single_ring_waves
+        from spirillum.kernels.core import ring_waves, single_ring_waves
 
         out = np.empty((2, 3, len(placed), high - low, 2, 3, theta.size), precision)
         fill = ring_waves if precision is np.float64 else single_ring_waves

@@ -138,7 +138,7 @@ def summed(function: Callable[[range], _T], count: int) -> list[_T]:
 
 def extensions(k: float, radius: float, rho: Samples, orders: int) -> Samples:
     """Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3)."""
-    from spirillum.kernels.stokes_flow import wave_extensions
+    from spirillum.kernels.core import wave_extensions
 
     found = np.empty((rho.size, orders, 3, 3))
     wave_extensions(k, radius, rho, found)
@@ -149,7 +149,7 @@ def weighted_layers(waves: WallWaves, number: int) -> Samples:
     """eps_p S_p at one k times its weight, (orders, 3, 3)."""
     from scipy.special import k0e, k1e
 
-    from spirillum.kernels.stokes_flow import wall_layers
+    from spirillum.kernels.core import wall_layers
 
     z = float(waves.k[number] * waves.radius)
     layers = np.empty((waves.orders[number], 3, 3))
@@ -175,11 +175,11 @@ def point_waves(
     precision: type[np.floating] = np.float64,
 ) -> Samples:
     """Velocities of waves of one k at points, (last - first, 2, 2, 3, 3 n): even, odd; real, imaginary."""
-    from spirillum.kernels import stokes_flow
+    from spirillum.kernels import core
 
     last = waves.orders[number] if last is None else last
     out = np.empty((last - first, 2, 2, 3, *points.shape), precision)
-    fill = stokes_flow.point_waves if precision is np.float64 else stokes_flow.single_point_waves
+    fill = core.point_waves if precision is np.float64 else core.single_point_waves
     fill(float(waves.k[number]), waves.radius, points, first, out)
     return out.reshape(*out.shape[:4], -1)
 

@@ -100,7 +100,7 @@ class Panels:
 
     def velocities(self, x: Samples, rho: Samples, modes: int, e2: float = 0.0, *, on_nodes: bool = False) -> Samples:
         """8 pi mu times the velocities at rings (x, rho) of unit densities, (modes, 3 rings, 3 nodes)."""
-        from spirillum.kernels.stokes_flow import layer_blocks
+        from spirillum.kernels.core import layer_blocks
 
         own = np.arange(x.size) if on_nodes else np.full(x.size, -1)
         blocks = np.empty((modes, x.size, 3, *self.x.shape, 3))
@@ -275,7 +275,7 @@ class Sources:
 
     def _from(self, panels: Panels, modes: int, dx: float = 0.0, drho: float = 0.0) -> Samples:
         """Velocities from ring forces at stations moved by dx and drho blob radii, (modes, 3 nodes, 3 stations)."""
-        from spirillum.kernels.stokes_flow import ring_blocks
+        from spirillum.kernels.core import ring_blocks
 
         x, rho = panels.x.ravel(), panels.rho.ravel()
         found: list[Samples] = [np.zeros((modes, 3 * panels.size, 0))]

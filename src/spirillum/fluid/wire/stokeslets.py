@@ -164,7 +164,7 @@ class WireSystem:
 
 def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSystem:
     """Equations of wires, each with the part that it moves with, at `standard` or `high` accuracy."""
-    from spirillum.kernels.stokes_flow import force_matrix
+    from spirillum.kernels.core import force_matrix
 
     none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))
     if not wires:
@@ -217,7 +217,7 @@ def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple
     moves the gradient along it by 4, 4, 4, 2, 2 over 8 pi mu a^2; the kernel's own answer on an infinite straight line
     is 2 (a/e)^2 of that, and what is missing is added to each station's own entry.
     """
-    from spirillum.kernels.stokes_flow import moment_matrices
+    from spirillum.kernels.core import moment_matrices
 
     tangents = np.concatenate([wire.tangents for wire in wires])
     helper = np.eye(3)[np.argmin(np.abs(tangents), axis=1)]

@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.pictures import pixels_of_points, points_of_pixels
+from spirillum.kernels.core import pixels_of_points, points_of_pixels
 from spirillum.vision.setup import Setup
 
 DIRECTIONS = {"right": 0.0, "left": -np.pi, "up": 0.5 * np.pi, "down": -0.5 * np.pi}

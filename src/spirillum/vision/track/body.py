@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_profiles
+from spirillum.kernels.core import profiles_across, robust_change, shifts_of_profiles
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale, theil_sen_line

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from spirillum.arrays import Samples
-from spirillum.kernels.edges import edge_places, edge_points
+from spirillum.kernels.core import edge_places, edge_points
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline, Segment

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.edges import profiles_across, seal_shares, seal_shifts
+from spirillum.kernels.core import profiles_across, seal_shares, seal_shifts
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour

@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.edges import edge_scores
+from spirillum.kernels.core import edge_scores
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.contour import GROUPS, Contour

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.edges import sums_along
+from spirillum.kernels.core import sums_along
 from spirillum.robust import mad_scale, repeated_median_line
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.camera.scale import Scale, with_source

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.pictures import profile_of_rows, stripe_fit, stripes_at
+from spirillum.kernels.core import profile_of_rows, stripe_fit, stripes_at
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.pictures import ridge_of, sampled, wave_fit, wave_scores
+from spirillum.kernels.core import ridge_of, sampled, wave_fit, wave_scores
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen

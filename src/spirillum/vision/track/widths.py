@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.pictures import stripe_edges
+from spirillum.kernels.core import stripe_edges
 from spirillum.robust import mad_scale
 from spirillum.vision.flag import Flag
 
