@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import jaxtyping  # noqa: F401 - shapes of arrays are then read as such
+from sphinx.pycode.parser import Parser
 
 from spirillum import __version__, arrays
 from spirillum.robot import fields as robot_fields
@@ -37,6 +38,7 @@ if smartquotes:
     extensions.append("sphinx.ext.viewcode")
 else:  # listings take longest; none of these can hold a warning
     logging.disable(logging.DEBUG)
+    Parser.parse_definition = lambda _self: None  # lines of definitions are for listings, and take a fifth of the time
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build"]
 
