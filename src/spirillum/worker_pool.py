@@ -77,6 +77,21 @@ def imap_unordered(
         pool.shutdown(wait=False, cancel_futures=True)
 
 
+@contextmanager
+def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor]:
+    """A process beside this one that runs `start`, such as imports, at once; it ends with the block."""
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_begin, initargs=(True,))
+    before = set(multiprocessing.active_children())
+    try:
+        with _start_of_processes():
+            pool.submit(start)
+        yield pool
+    finally:
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
 def memory_in_use() -> float:
     """Memory of this process, bytes; 0 where the system does not report it."""
     try:

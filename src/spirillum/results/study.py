@@ -8,8 +8,10 @@ import json
 import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -35,8 +37,12 @@ from spirillum.studies.study_loader import LARGEST_STUDY, load_study, observed_a
 from spirillum.view.figures.comparison import ranking_picture
 from spirillum.view.figures.release import release_picture
 from spirillum.view.figures.robot import robot_figure, robot_words
-from spirillum.view.figures.sheet import Picture
-from spirillum.worker_pool import pool_of_workers
+from spirillum.view.figures.sheet import Picture, Sheet
+from spirillum.view.figures.style import PAGE, styled
+from spirillum.worker_pool import pool_of_workers, process_beside
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
 
 
 def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
@@ -77,16 +83,24 @@ def _rebuilt(table: Mapping[str, Any]) -> Robot:
 _LARGEST_SVG = 2_000_000  # a larger vector picture is embedded as pixels, bytes
 
 
+def study_pictures(dataset: xr.Dataset) -> dict[str, Picture]:
+    """The figures of a study by the names of their files."""
+    ranking = ranking_of(dataset)
+    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
+    drawn = {"robot": robot_picture(dataset, ranking), "laid-down": release_picture(dataset, ranking)}
+    return {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
+
+
 def write_report(
-    dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None], *, vector: bool = False
+    dataset: xr.Dataset,
+    folder: Path,
+    on_progress: Callable[[str, int, int], None],
+    *,
+    vector: bool = False,
+    beside: ProcessPoolExecutor | None = None,
 ) -> None:
     """Write `figures/`, a self-contained `report.html`, and the files of `write_tables`."""
-    ranking = ranking_of(dataset)
-    robot = robot_picture(dataset, ranking)
-    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
-    laid_down = release_picture(dataset, ranking)
-    drawn = {"robot": robot, "laid-down": laid_down}
-    pictures = {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
+    pictures = study_pictures(dataset)
     steps = len(pictures) + 1
     embedded = draw_pictures(
         pictures,
@@ -94,6 +108,8 @@ def write_report(
         lambda name, done: on_progress(f"figure {name}", done, steps),
         vector=vector,
         largest_svg=_LARGEST_SVG,
+        again=partial(study_pictures, dataset),
+        beside=beside,
     )
     on_progress("report", len(pictures), steps)
     claims, predictions = write_tables(dataset, folder)
@@ -235,16 +251,23 @@ def study(  # noqa: PLR0913 - the options of the command
                 check_replaceable(folder / name, begins=begin.encode())
         make_tables(loaded, pool, on_progress)
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
-        if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
-            parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
-            dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
-            write_dataset(dataset, folder / "dataset.nc", replace="any")
-            shutil.rmtree(parts, ignore_errors=True)
-        if figures:
-            write_report(dataset, folder, on_progress, vector=vector)
-        else:
-            write_tables(dataset, folder)
+        with process_beside(_import_figures) if figures and workers != 1 else nullcontext() as beside:
+            if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
+                parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
+                dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
+                write_dataset(dataset, folder / "dataset.nc", replace="any")
+                shutil.rmtree(parts, ignore_errors=True)
+            if figures:
+                write_report(dataset, folder, on_progress, vector=vector, beside=beside)
+            else:
+                write_tables(dataset, folder)
     return StudyDataset.of(dataset)
+
+
+def _import_figures() -> None:
+    """Load what drawing takes: this module has its imports, an empty sheet the fonts and the parser of formulas."""
+    with styled():
+        Sheet("$x$", "", width=PAGE, heights=[1.0], columns=1).finished()
 
 
 def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:

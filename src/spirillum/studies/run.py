@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
@@ -81,11 +83,41 @@ def kept(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, 
     return part if whole and fits else None
 
 
-def keep(number: int, part: Part, folder: Path | None) -> None:
+_LARGEST_PART = 1 << 30
+
+
+def keep(number: int, part: Part, folder: Path) -> None:
     """Keep a finished answer."""
-    if folder is not None:
-        with atomic_write(folder / _PART.format(number), replace="any") as path, path.open("wb") as stream:
-            np.savez(stream, **cast("dict[str, Any]", part))
+    with atomic_write(folder / _PART.format(number), replace="any") as path, path.open("wb") as stream:
+        np.savez(stream, **cast("dict[str, Any]", part))
+
+
+@contextmanager
+def _kept_at_times(folder: Path | None) -> Iterator[Callable[[int, Part], None]]:
+    """A function that takes finished answers: each second they are kept together, and all of them at an error."""
+    waiting: list[tuple[int, Part]] = []
+    last = monotonic()
+
+    def keep_all() -> None:
+        nonlocal last
+        while waiting and folder is not None:
+            keep(*waiting[0], folder)
+            del waiting[0]
+        last = monotonic()
+
+    def finished(number: int, part: Part) -> None:
+        waiting.append((number, part))
+        if monotonic() - last > _PERIOD:
+            keep_all()
+
+    try:
+        yield finished
+    except BaseException:
+        keep_all()
+        raise
+
+
+_PERIOD = 1.0  # between two times at which answers are kept, s: to write one whole takes as long as a quick answer
 
 
 Progress = Callable[[str, int, int], None]  #: Called with what is being done, steps done and steps in all.
@@ -133,11 +165,12 @@ def computed_study(
         tell(missing[0].words, done, len(requested))
     jobs = (requested[number].job(loaded, observed)._replace(number=number) for number in numbers)
     at_work = _worth(missing, pool or WorkerPool())
-    for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
-        found[job.number] = part
-        keep(job.number, part, parts)
-        done += 1
-        tell(requested[job.number].words, done, len(requested))
+    with _kept_at_times(parts) as finished:
+        for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
+            found[job.number] = part
+            finished(job.number, part)
+            done += 1
+            tell(requested[job.number].words, done, len(requested))
     tell("dataset", len(requested), len(requested))
 
     def answered(kind: type[_Task]) -> list[tuple[_Task, Part]]:

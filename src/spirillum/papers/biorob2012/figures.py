@@ -89,7 +89,7 @@ def _draw(shown: StudyView, evidence: Evidence, notes: list[str]) -> Figure:
     panels[0].set_ylabel("loss at equal motor rates\n$1-U_{narrow}/U_{wide}$ (%)")
     bottom, top = panels[0].get_ylim()
     panels[0].set_ylim(min(bottom, 0.0), max(top, 60.0))
-    return sheet.finished()
+    return sheet.finished(alike=True)
 
 
 def _range(evidence: Evidence, model: str) -> tuple[Values, Values]:

@@ -299,7 +299,7 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             axes.xaxis.set_major_locator(
                 FixedLocator(list(few)) if few.size <= _MOST_TICKS else MaxNLocator(4, integer=True)
             )
-        return sheet.finished()
+        return sheet.finished(alike=True)
 
 
 def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:

@@ -38,6 +38,7 @@ class Picture:
 
 _NARROWEST = 5.2
 _MARGINS, _GAP = 0.94, 0.14  # typical room for the labels beside a row of panels, and between panels, inches
+_PAD = 0.06  # free edge around each panel with its labels, inches
 _EDGE = 0.012  # free edge at the left and at the right, share of the width
 
 
@@ -78,7 +79,7 @@ class Sheet:
         self.shown_dpi = self.figure.dpi
         self.figure.set_dpi(DPI)  # words are measured once for the layout and for the PNG
         rect = (_EDGE, 0.0, 1.0 - 2.0 * _EDGE, 1.0)
-        self.figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.06, wspace=0.0, hspace=0.0, rect=rect)
+        self.figure.set_layout_engine("constrained", w_pad=_PAD, h_pad=_PAD, wspace=0.0, hspace=0.0, rect=rect)
         # One title and one legend find room in a figure; the next ones stand in figures within it.
         outer = _within(self.figure)
         left: Any = {"x": 0.0, "ha": "left"}
@@ -99,22 +100,37 @@ class Sheet:
             axes.tick_params(length=2.5, width=0.6, labelsize=8, colors="#333333")
             axes.tick_params(grid_color="#dddddd", grid_linewidth=0.5)
 
-    def finished(self, shape: float | None = None) -> Figure:
-        """Fix the layout: as high as the panels need."""
+    def finished(self, shape: float | None = None, *, alike: bool = False) -> Figure:
+        """Fix the layout: as high as the panels need; where columns are alike, that of the first gives the others'."""
         beside = self.panels[:, 1:].ravel()
         for axes in beside if shape is None else ():  # one column determines the height, in a fraction of the time
             axes.set_in_layout(False)
         lay_out(self.figure)
-        for axes in beside:
-            axes.set_in_layout(True)
+        if not alike:
+            for axes in beside:
+                axes.set_in_layout(True)
         first, dpi = self.panels[0, 0].get_window_extent(), self.figure.dpi
         height = self.heights[0] if shape is None else shape * first.width / dpi
         missing = (height - first.height / dpi) * sum(self.heights) / self.heights[0]
         self.figure.set_figheight(self.figure.get_figheight() + missing)
         lay_out(self.figure)
+        if alike:
+            self._spread_columns()
         self.figure.set_layout_engine("none")
         self.figure.set_dpi(self.shown_dpi)
         return self.figure
+
+    def _spread_columns(self) -> None:
+        """Place all columns as wide as each other between the left edge of the first and the right of the figure."""
+        count = self.panels.shape[1]
+        pad = _PAD / (self.panels[0, 0].figure.bbox.width / self.figure.dpi)
+        left = self.panels[0, 0].get_position().x0
+        step = (1.0 - pad - left + 2.0 * pad) / count
+        for row in self.panels:
+            box = row[0].get_position()
+            for column, axes in enumerate(row):
+                axes.set_position((left + column * step, box.y0, step - 2.0 * pad, box.height))
+                axes.set_in_layout(True)
 
 
 def _within(figure: Figure | SubFigure) -> SubFigure:

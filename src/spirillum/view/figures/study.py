@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from spirillum.view.figures.rows import (
     PanelRow,
@@ -160,7 +160,7 @@ def _draw_channel(
             if number == 0:
                 head_column(axes, shown, wavelength)
         _finish_row(sheet.panels[number], row)
-    return sheet.finished()
+    return sheet.finished(alike=True)
 
 
 def _finish_row(panels: Sequence[Axes], row: PanelRow) -> None:
@@ -182,6 +182,7 @@ def _finish_row(panels: Sequence[Axes], row: PanelRow) -> None:
         stretch = max(np.sqrt(12.0 * low / high), 1.0)  # more than a decade, so that two powers of ten are labelled
         panels[0].set_ylim(low / stretch, high * stretch)
         panels[0].yaxis.set_major_locator(LogLocator(numticks=6))
+        panels[0].yaxis.set_minor_locator(NullLocator())  # each of its many marks takes as long as a label
         return
     panels[0].yaxis.set_major_locator(MaxNLocator(5))
     if float(values.min()) >= 0.0:
@@ -273,7 +274,7 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
     ends = [sheet.panels[number][0].get_ylim() for number in range(len(channels))]
     for number in range(len(channels)):  # one scale for all rows, which are there to be compared
         sheet.panels[number][0].set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
-    return sheet.finished()
+    return sheet.finished(alike=True)
 
 
 def _paper_entry(shown: StudyView, channels: Sequence[int], scale: UnitPrefix) -> list[Line2D]:
