@@ -83,9 +83,6 @@ def kept(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, 
     return part if whole and fits else None
 
 
-_LARGEST_PART = 1 << 30
-
-
 def keep(number: int, part: Part, folder: Path) -> None:
     """Keep a finished answer."""
     with atomic_write(folder / _PART.format(number), replace="any") as path, path.open("wb") as stream:
