@@ -13,7 +13,7 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.view.scene3d.scene import DrawnRobot, Scene, level_height, resting
-from spirillum.view.scene3d.scenery import VIEWS, Margins, checked_view, fitted
+from spirillum.view.scene3d.scenery import VIEWS, fitted
 from spirillum.view.scene3d.show import glass_around, shown_points
 
 SIZE = (400, 226)
@@ -46,7 +46,7 @@ def tilted(free_robot: Any) -> Iterator[Scene]:
 @pytest.mark.parametrize("view", VIEWS)
 def test_silhouette_is_where_the_mesh_projects_to(free_robot: Any, tilted: Scene, view: str) -> None:
     points = DrawnRobot.of(free_robot).points(TILTED)
-    camera = fitted(checked_view(view), points, SIZE, Margins(0.1, 0.1, 0.1))
+    camera = fitted(view, points, SIZE, (0.1, 0.1, 0.1))
     tilted.look(camera)
     mask = np.any(tilted.image() != 255, axis=2)
     pixels = camera.pixels(points, SIZE)
@@ -104,7 +104,7 @@ def test_stripes_have_their_colours_in_order(free_robot: Any, rolled: Scene, vie
     solids = DrawnRobot.of(free_robot)
     stripes = free_robot.seal.stripes
     radius, x = 0.5 * free_robot.body.diameter, -0.5 * free_robot.body.length + 0.5 * free_robot.seal.length
-    camera = fitted(checked_view(view), solids.corners(ROLLED), ROLLED_SIZE)
+    camera = fitted(view, solids.corners(ROLLED), ROLLED_SIZE)
     rolled.look(camera)
     image = rolled.image().astype(float)
     names = list(dict.fromkeys(stripes))
@@ -129,7 +129,7 @@ def test_channel_is_drawn_at_its_radius_and_the_robot_on_its_floor() -> None:
     pose = resting(solids)
     assert level_height(solids) == pytest.approx(-0.5 * (0.040 - 0.018), abs=1e-6)
     glass = (-0.1, 0.04)
-    camera = fitted("front", shown_points(solids, pose, glass), SIZE, Margins(0.1, 0.1, 0.1))
+    camera = fitted("front", shown_points(solids, pose, glass), SIZE, (0.1, 0.1, 0.1))
     image = drawn(solids, camera, pose, glass=glass)
     rings = {}
     for share in (0.93, 1.017, 1.06):

@@ -23,7 +23,7 @@ from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK, round_length
 from spirillum.view.figures.style import COLOURS, with_micro
 from spirillum.view.scene3d.rendering import FILMS, film_writer
-from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
+from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
 from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
 
 if TYPE_CHECKING:
@@ -157,7 +157,8 @@ def film(
         InputError: for wrong input, a run that cannot be shown, or a machine that cannot draw.
     """
     target = output_target(path, FILMS, "run.mp4")
-    seen_from, pixels = checked_view(view), _even(checked_size(size))
+    check_choice("view", view, VIEWS)
+    pixels = _even(checked_size(size))
     _check_pace(fps, 1.0 if speed is None else speed, target.suffix.lower())
     check_choice("camera", camera, CAMERAS)
     if isinstance(dataset, (str, Path)):
@@ -176,7 +177,7 @@ def film(
     inset = None
     if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
-    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
+    shots = _Shots(solids, poses, view, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
     on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, _about(dataset, model), speed)) as images:
@@ -203,7 +204,7 @@ class _Shots:
         self,
         solids: DrawnRobot,
         poses: Poses,
-        view: View,
+        view: str,
         size: tuple[int, int],
         *,
         follows: bool,
@@ -228,7 +229,7 @@ class _Shots:
             several = [pose._replace(position=pose.position - self._free * (pose.position - start)) for pose in several]
             glass = glass_around(self._solids, float(start[0]), float(start[0]))
         points = np.concatenate([shown_points(self._solids, pose, glass) for pose in several])
-        camera = fitted(self._view, points, self._size, Margins())
+        camera = fitted(self._view, points, self._size)
         if self._follows and self._glass is not None:
             points = np.concatenate([points, shown_points(self._solids, several[0], self._glass)])
         height = camera.pixels(points, self._size)[:, 1] - 0.5 * self._size[1]

@@ -18,7 +18,7 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.scene import round_length
 from spirillum.view.scene3d.rendering import new_plotter
-from spirillum.view.scene3d.scenery import SceneCamera, View, add_glass
+from spirillum.view.scene3d.scenery import SceneCamera, add_glass
 
 _ALONG, _AROUND = 160, 49
 _HALF_ANGLE = 0.9
@@ -45,8 +45,7 @@ def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples
 
 def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: float) -> Any:
     """Add the shadow of a robot whose body's mid-length is at x = 0; the actor moves along the tube with it."""
-    if robot.channel is None:
-        raise ValueError("a robot without a channel has no floor to shade")
+    assert robot.channel is not None  # noqa: S101 - the caller's promise
     radius = 0.5 * robot.channel.diameter
     reach = 0.5 * robot.body.length + 0.5 * radius
     x = np.linspace(-reach - robot.coupling.length, reach, _ALONG)
@@ -118,7 +117,7 @@ _COLOUR = "#c3d3dd"
 _MOST_LINES = 400
 _BEYOND = 8  # lines beyond what is to be seen, on every side
 _WIDTH = 0.014  # width of a line, in distances of lines
-_ACROSS_GRID: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
+_ACROSS_GRID: dict[str, int] = {"perspective": 2, "top": 2, "side": 1}
 """Axis across the grid, by view; along x there is none, for the robot swims through it."""
 
 
@@ -240,7 +239,7 @@ class Scene(AbstractContextManager["Scene"]):
             actor.prop.interpolation = "Phong"
         return actor
 
-    def add_grid(self, view: View, low: Samples, high: Samples) -> None:
+    def add_grid(self, view: str, low: Samples, high: Samples) -> None:
         """Add a faint grid below the robot, or behind it where it is seen from the side; corners of the space, m."""
         if view not in _ACROSS_GRID:
             return

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError, did_you_mean
-
-View = Literal["perspective", "side", "top", "front", "rear"]
-VIEWS: tuple[View, ...] = ("perspective", "side", "top", "front", "rear")
-"""Views of a robot: all but the first are parallel projections, to scale."""
 
 _LINE_OF_SIGHT: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "perspective": ((-0.36, 1.0, -0.32), (0.0, 0.0, 1.0)),
@@ -23,17 +17,9 @@ _LINE_OF_SIGHT: dict[str, tuple[tuple[float, float, float], tuple[float, float, 
     "front": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
     "rear": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 }
+VIEWS = tuple(_LINE_OF_SIGHT)  #: Views of a robot: all but the first are parallel projections, to scale.
 _FIELD_OF_VIEW = np.radians(22.0)
 _MAX_ITERATIONS = 60
-
-
-@dataclass(frozen=True)
-class Margins:
-    """Room between picture and edge, as shares of width and height."""
-
-    side: float = 0.05
-    top: float = 0.14
-    bottom: float = 0.14
 
 
 @dataclass(frozen=True)
@@ -78,16 +64,13 @@ class SceneCamera:
         return replace(self, focal=self.focal + shift)
 
 
-def checked_view(view: str) -> View:
-    """The view of that name."""
-    for name in VIEWS:
-        if view == name:
-            return name
-    raise InputError(f"view = {str(view)[:40]!r}{did_you_mean(str(view), VIEWS)}; allowed: {', '.join(VIEWS)}")
+def fitted(
+    view: str, points: Samples, size: tuple[int, int], margins: tuple[float, float, float] = (0.05, 0.14, 0.14)
+) -> SceneCamera:
+    """The camera of a view that has all points in the picture, as near as the margins allow.
 
-
-def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins | None = None) -> SceneCamera:
-    """The camera of a view that has all points within the margins, as near as they allow."""
+    `margins` are room at the sides, above and below, as shares of width and height.
+    """
     sight, up = (np.array(vector) for vector in _LINE_OF_SIGHT[view])
     sight = sight / np.linalg.norm(sight)
     up = up - (up @ sight) * sight
@@ -95,18 +78,12 @@ def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins 
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     reach = float(np.linalg.norm(np.ptp(points, axis=0)))
     camera = SceneCamera(middle, sight, up, reach / np.tan(0.5 * _FIELD_OF_VIEW), reach, view != "perspective")
-    return _framed(camera, lambda c: c.pixels(points, size), size, margins or Margins())
-
-
-def _framed(
-    camera: SceneCamera, seen: Callable[[SceneCamera], Samples], size: tuple[int, int], margins: Margins
-) -> SceneCamera:
-    """Shift and approach until the margins are touched: a fixed-point iteration, one step without perspective."""
-    width, height = size
-    left, right = margins.side * width, (1.0 - margins.side) * width
-    top, bottom = margins.top * height, (1.0 - margins.bottom) * height
-    for _ in range(_MAX_ITERATIONS):
-        low, high = seen(camera).min(axis=0), seen(camera).max(axis=0)
+    (width, height), (side, above, below) = size, margins
+    left, right = side * width, (1.0 - side) * width
+    top, bottom = above * height, (1.0 - below) * height
+    for _ in range(_MAX_ITERATIONS):  # a fixed-point iteration, of one step without perspective
+        pixels = camera.pixels(points, size)
+        low, high = pixels.min(axis=0), pixels.max(axis=0)
         unit = 2.0 * camera.half_height / height
         wanted = np.array([0.5 * (left + right), 0.5 * (top + bottom)])
         off = (0.5 * (low + high) - wanted) * unit

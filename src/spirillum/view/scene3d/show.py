@@ -14,14 +14,14 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError, check_choice, clipped
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 from spirillum.view.figures.scene import tail_words
 from spirillum.view.figures.style import in_words
-from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
+from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
 
 if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
@@ -36,7 +36,7 @@ class Picture3D(DisplayMixin):
     """A picture of a robot."""
 
     robot: Robot
-    view: View
+    view: str
     phase: float  #: Phase of the tail, rad.
     pixels: np.ndarray  #: (height, width, 3) the picture, sRGB bytes.
     camera: SceneCamera  #: View: `camera.pixels(points, size)` gives the picture coordinates of points of the lab.
@@ -103,7 +103,7 @@ def show(
         InputError: for wrong input, a target that cannot be written, or a machine that cannot draw.
     """
     target = None if path is None else output_target(path, {".png": "a picture"}, "robot.png")
-    seen_from = checked_view(view)
+    check_choice("view", view, VIEWS)
     turned = parse_option("phase", phase, KINDS["angle"])
     pixels = checked_size(size)
     loaded = load(robot)
@@ -115,7 +115,7 @@ def show(
     solids = DrawnRobot.of(loaded, fineness=2.0)
     pose = resting(solids, turned)
     glass = glass_around(solids, pose.position[0], pose.position[0]) if channel else None
-    camera = fitted(seen_from, shown_points(solids, pose, glass), pixels, Margins())
+    camera = fitted(view, shown_points(solids, pose, glass), pixels)
     if window:
         with Scene(solids, pixels, glass=glass, live=True) as scene:
             scene.place(pose)
@@ -129,8 +129,8 @@ def show(
     bar = scale_bar(camera, pixels, pose.position)
     image = blended_into(words_on(pixels, camera, bar, loaded.name, _lines(loaded, camera, glass)))(image)
     if target is not None:
-        _write_png(image, target, loaded, seen_from)
-    return Picture3D(loaded, seen_from, turned, image, camera, pose, target)
+        _write_png(image, target, loaded, view)
+    return Picture3D(loaded, view, turned, image, camera, pose, target)
 
 
 def glass_around(
@@ -170,7 +170,7 @@ def _lines(robot: Robot, camera: SceneCamera, glass: tuple[float, float] | None)
     return lines
 
 
-def _write_png(image: np.ndarray, path: Path, robot: Robot, view: View) -> None:
+def _write_png(image: np.ndarray, path: Path, robot: Robot, view: str) -> None:
     from PIL import Image, PngImagePlugin
 
     words = f"{robot.name}, {view} view: a {tail_words(robot)}. Computed geometry, not a photograph."
