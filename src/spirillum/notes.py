@@ -134,7 +134,7 @@ def notes_in_answer(answer: Mapping[str, Any]) -> tuple[Note, ...]:
     return tuple(Note(item["code"], item["sentence"], item["fields"]) for item in answer.get("notes", ()))
 
 
-def shown_cautions(notes: Iterable[Note], most: int = 3, width: int = 80) -> list[Note]:
+def shown_cautions(notes: Iterable[Note]) -> list[Note]:
     """The weightiest cautions, one of a code, as many as fit into three rows of a terminal."""
     order = list(KINDS)
     first: dict[str, Note] = {}
@@ -144,8 +144,8 @@ def shown_cautions(notes: Iterable[Note], most: int = 3, width: int = 80) -> lis
     shown: list[Note] = []
     rows = 0
     for note in sorted(first.values(), key=lambda note: order.index(note.code)):
-        rows += -(-len(f"{note.severity}: {note}") // width)
-        if shown and rows > most:
+        rows += -(-len(f"{note.severity}: {note}") // 80)
+        if shown and rows > 3:
             break
         shown.append(note)
     return shown

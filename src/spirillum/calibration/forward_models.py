@@ -62,10 +62,6 @@ class Predicted:
     turning: Samples  #: Omega/omega.
     load: Samples  #: T_h/omega: torque that turns the rotor against the fluid, N m s.
 
-    def over_motor(self) -> Samples:
-        """U/omega_m, m/rad."""
-        return self.advance / (1.0 - self.turning)
-
 
 @dataclass(frozen=True)
 class DryContact:

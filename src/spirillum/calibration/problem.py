@@ -139,20 +139,18 @@ class Problem:
         """What is compared, (draws, robots)."""
         draws = self.draws(z)
         shape = (z.shape[0], self.experiment.size)
+        answer: dict[Quantity, Samples] = {}
         if self.trials is not None:
-            advance, turning, motor_rate = self.trials.at(draws)
-            over = np.where(self.experiment.by_motor, advance / (1.0 - turning), advance)
-            every: dict[Quantity, Samples] = {"advance": over, "turning": turning, "motor_rate": motor_rate}
-            return {name: np.broadcast_to(every[name], shape) for name in self.quantities}
-        balance = self.forward.balance(draws)
-        found = kinematics(balance)
-        answer: dict[Quantity, Samples] = {
-            "advance": np.where(self.experiment.by_motor, found.over_motor(), found.advance),
-            "turning": found.turning,
-        }
-        if self.by_motor_rate:
-            friction = draws.get("shared_friction", self.fixed_friction[None])
-            answer["motor_rate"] = self.forward.motor_rate(balance, draws, friction)
+            advance, turning, answer["motor_rate"] = self.trials.at(draws)
+        else:
+            balance = self.forward.balance(draws)
+            found = kinematics(balance)
+            advance, turning = found.advance, found.turning
+            if self.by_motor_rate:
+                friction = draws.get("shared_friction", self.fixed_friction[None])
+                answer["motor_rate"] = self.forward.motor_rate(balance, draws, friction)
+        over_motor = np.where(self.experiment.by_motor, advance / (1.0 - turning), advance)
+        answer |= {"advance": over_motor, "turning": turning}
         # What does not depend on any free number comes back once for all draws.
         return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}
 

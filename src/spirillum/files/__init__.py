@@ -4,7 +4,6 @@ from spirillum.files.limits import checked_path, file_name, is_text, text_cell
 from spirillum.files.locks import scratch_folder
 from spirillum.files.netcdf import loaded_netcdf, netcdf_file, open_netcdf, write_dataset
 from spirillum.files.reading import (
-    checked_file,
     csv_rows,
     opened,
     parse_toml,

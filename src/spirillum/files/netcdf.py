@@ -103,10 +103,10 @@ def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> I
         raise InputError(f"{path} cannot be read ({first[:150]}); allowed: {what}") from error
 
 
-def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF, group: str | None = None) -> xr.Dataset:
+def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> xr.Dataset:
     """A dataset from its file, loaded whole."""
     with open_netcdf(path, what, largest) as file:
-        return group_of(file, group)
+        return group_of(file)
 
 
 def group_of(file: h5netcdf.File, group: str | None = None) -> xr.Dataset:

@@ -132,16 +132,6 @@ def _refused(path: Path, error: OSError, what: str) -> InputError:
     return InputError(f"{str(path)[:200]!r} cannot be read ({error.strerror}); allowed: {what}")
 
 
-def checked_file(path: str | Path, what: str, largest: int) -> Path:
-    """A user's file that a library is to open by its name."""
-    with opened(path, what, largest) as stream:
-        try:
-            stream.read(1)
-        except OSError as error:
-            raise _refused(Path(path), error, what) from error
-    return Path(path)
-
-
 def read_bytes(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> bytes:
     """All of a user's file, at most `largest` bytes even if it grows while it is read."""
     with opened(path, what, largest) as stream:
@@ -167,9 +157,9 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> str:
     return text
 
 
-def read_json(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> Any:
+def read_json(path: str | Path, what: str) -> Any:
     """What a JSON file holds."""
-    text = read_text(path, what, largest)
+    text = read_text(path, what)
     with suppress(ValueError, RecursionError):
         return json.loads(text)
     raise InputError(f"{path} is damaged; allowed: {what}")

@@ -140,11 +140,11 @@ class RenderedSolid:
 
 
 def solids_of(
-    robot: Robot, fineness: float = 1.0, edges: Samples | None = None, *, covered: bool = False
+    robot: Robot, edges: Samples | None = None, *, covered: bool = False
 ) -> tuple[RenderedSolid, RenderedSolid]:
     """Body and rotor of a robot, the rotor with its tail at phase 0."""
     robot.check_body("the virtual camera")
-    pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
+    pieces = robot_mesh(robot, phase=0.0)
     if edges is not None:
         pieces = tuple(
             replace(piece, vertices=repainted(robot, piece.vertices, edges)) if piece.name == "body" else piece
