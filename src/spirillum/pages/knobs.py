@@ -67,6 +67,7 @@ class Knob:
     label: str  #: Text of the value.
     group: str  #: Heading of its group.
     unit: str = ""  #: Unit in which it is shown; empty for a choice.
+    kind: str = ""  #: Kind of its quantity, of `units.KINDS`; empty for a choice.
     low: float = 0.0  #: Ends of its slider, in that unit; a value outside them can be typed.
     high: float = 1.0
     choices: tuple[str, ...] = ()  #: Options of a choice.
@@ -79,7 +80,7 @@ class Knob:
 def _knobs() -> Iterator[Knob]:
     """The rows of `knobs.csv`; a choice has no range."""
     for row in rows_of("pages/knobs.csv"):
-        words: Any = {name: row[name] for name in ("field", "label", "group", "unit", "note", "unset", "needs")}
+        words: Any = {name: row[name] for name in ("field", "label", "group", "unit", "kind", "note", "unset", "needs")}
         ends: Any = {end: float(row[end]) for end in ("low", "high") if row[end]}
         yield Knob(**words, **ends, choices=tuple(row["choices"].split()), logarithmic=row["logarithmic"] != "")
 
@@ -88,7 +89,6 @@ KNOBS = tuple(_knobs())  #: All knobs, in their order, without the model, the re
 
 MODELS = ("auto", "tube", "slender", "rft")  #: Models that can move a free robot.
 _BY_FIELD = {knob.field: knob for knob in KNOBS}
-_RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class Settings:
             short = name.removeprefix("run.")
             kept = {key: item for key, item in self.run.items() if key != short}
             if value:
-                parse_option(short, value, KINDS[_RUN_KINDS[name]])
+                parse_option(short, value, KINDS[knob.kind])
                 kept[short] = value
             return replace(self, run=kept)
         return replace(self, overrides={**self.overrides, name: value})
@@ -152,7 +152,7 @@ def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
     if knob.field.startswith("run."):
         short = knob.field.removeprefix("run.")
         given = settings.run.get(short)
-        si = None if given is None else parse_option(short, given, KINDS[_RUN_KINDS[knob.field]])
+        si = None if given is None else parse_option(short, given, KINDS[knob.kind])
     else:
         table, name = knob.field.split(".")
         si = getattr(getattr(robot, table), name)
@@ -162,19 +162,11 @@ def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
         return found | {"value": None, "low": knob.low, "high": knob.high}
     limit, smaller = _SMALL.get(knob.unit, (0.0, knob.unit))
     unit = smaller if abs(float(si)) < limit else knob.unit
-    value = float(si) / parse_quantity(f"1 {unit}", KINDS[_UNIT_KINDS.get(unit, "length")])
+    value = float(si) / parse_quantity(f"1 {unit}", KINDS[knob.kind])
     low, high = _range(knob, value) if unit == knob.unit else _around(value)
     return found | {"unit": unit, "value": float(f"{value:.12g}"), "low": low, "high": high}
 
 
-_UNIT_KINDS = {
-    "Pa s": "viscosity",
-    "mPa s": "viscosity",
-    "mm/s": "velocity",
-    "deg": "pitch",
-    "mT": "magnetic field",
-    "Hz": "rate",
-}
 _SMALL = {"mm": (2e-5, "um"), "Pa s": (0.02, "mPa s")}
 """Unit of a control to the SI size below which it is shown in another, as a bacterium's."""
 
