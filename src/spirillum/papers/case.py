@@ -221,7 +221,11 @@ def _own_values(
         else:
             values = _KINDS[kind](robot, point.model or case.model, point, trial is None)
         known |= {f"{kind}.{name}": value for name, value in values.items()}
-    return {name: _in_unit(known[quantity.of], quantity, robot) for name, quantity in quantities.items()}
+    found = {}
+    for name, one in quantities.items():
+        divisor = one.over * robot.fluid.viscosity**one.viscosity * robot.tail.amplitude**one.radius * one.si_value
+        found[name] = CaseValue(known[one.of].value / divisor, known[one.of].stated_error)
+    return found
 
 
 def robot_of(case: Case, point: CasePoint, trial: CaseTrial | None = None) -> Robot:
@@ -237,11 +241,6 @@ def robot_of(case: Case, point: CasePoint, trial: CaseTrial | None = None) -> Ro
 def _unset(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a robot; None takes one out."""
     return {path: None if value == "unset" else value for path, value in fields.items()}
-
-
-def _in_unit(found: CaseValue, quantity: CaseQuantity, robot: Robot) -> CaseValue:
-    divisor = quantity.over * robot.fluid.viscosity**quantity.viscosity * robot.tail.amplitude**quantity.radius
-    return CaseValue(found.value / divisor / quantity.si_value, found.stated_error)
 
 
 def _swimming(robot: Robot, model: str, point: CasePoint, is_nominal: bool) -> dict[str, CaseValue]:  # noqa: FBT001

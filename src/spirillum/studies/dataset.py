@@ -83,7 +83,8 @@ def release_variables(
         axes = (len(shape), len(shape) + 1)
         with np.errstate(invalid="ignore"):
             low, high = (reduce(values, axis=axes) for reduce in (np.fmin.reduce, np.fmax.reduce))
-        effects = _effects(values, len(shape))
+        last = np.moveaxis(values, axes, (-2, -1))
+        effects = main_effects(last.reshape(*last.shape[:-2], -1), levels_of_readings())
 
         def about(words: str, base: str = base, meaning: str = meaning) -> dict[str, Any]:
             return attributes(base, meaning=f"{meaning}, {words}", source=_SOURCE)
@@ -96,12 +97,6 @@ def release_variables(
     pitch = attributes("pitch", meaning="pitch at release, nose up", source="design of the runs")
     found["pitch_of_run"] = ((*robots, "run"), gathered(answers, "laid_pitch", shape), pitch)
     return found
-
-
-def _effects(values: Values, robots: int) -> Values:
-    """Main effects of `READ`; runs and windows are axes `robots` and `robots + 1`."""
-    last = np.moveaxis(values, (robots, robots + 1), (-2, -1))
-    return main_effects(last.reshape(*last.shape[:-2], -1), levels_of_readings())
 
 
 _PAPER = "BioRob 2012"

@@ -139,7 +139,8 @@ def computed_study(
 ) -> xr.Dataset:
     """The dataset of a study; finished parts are kept in and reused from the folder `parts`."""
     followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial
-    with_table = _with_table(loaded) if followed else {}
+    every = enumerate(loaded.robot_at(index) for index in range(loaded.count)) if followed else ()
+    with_table = {index: one for index, one in every if one.channel and has_table(RobotBatch.of(one), "yaw")}
     requested: list[StudyTask] = [
         *tasks(loaded),
         *band_tasks(loaded),
@@ -270,12 +271,6 @@ def make_tables(loaded: LoadedStudy, pool: WorkerPool, tell: Progress) -> None:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
         tell(f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
         prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=tell)
-
-
-def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:
-    """Robots that have a table of their tube, by their index in the flat order of the study."""
-    every = ((index, loaded.robot_at(index)) for index in range(loaded.count))
-    return {index: robot for index, robot in every if robot.channel and has_table(RobotBatch.of(robot), "yaw")}
 
 
 def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[Note]:

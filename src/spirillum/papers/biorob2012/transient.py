@@ -5,7 +5,6 @@ Explicit steps follow the motor's time constant L/R; `simulate` takes none while
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,26 +40,17 @@ def adams_states(robot: AxialRobot, time: Samples, duty: Samples) -> Samples:
         changes = np.flatnonzero(duty[begin + 1 :] != duty[begin + 1])
         end = begin + 1 + (int(changes[0]) if changes.size else time.size - begin - 1)
         since = time[begin + 1 : end] - time[begin]
-        states[begin + 1 : end] = _stretch(_derivative(robot, float(duty[begin + 1])), states[begin], since)
+        states[begin + 1 : end] = _stretch(robot, float(duty[begin + 1]), states[begin], since)
         begin = end - 1
     return states
 
 
-def _derivative(robot: AxialRobot, duty: float) -> Callable[[float, Samples], Samples]:
-    """d/dt of the state and of the integrals of I^2 and R I^2."""
-    numbers = robot.numbers
-
-    def derivative(_time: float, y: Samples) -> Samples:
-        return rates(numbers, float(y[0]), duty, 0.0)
-
-    return derivative
-
-
-def _stretch(derivative: Callable[[float, Samples], Samples], start: Samples, times: Samples) -> Samples:
+def _stretch(robot: AxialRobot, duty: float, start: Samples, times: Samples) -> Samples:
     """States at times after a switching, s."""
     from scipy.integrate import ode
 
-    solver = ode(derivative)
+    numbers = robot.numbers
+    solver = ode(lambda _time, y: rates(numbers, float(y[0]), duty, 0.0))
     solver.set_integrator(
         "vode", method="adams", order=_HIGHEST_ORDER, rtol=_TOLERANCE, atol=1e-3 * _TOLERANCE, nsteps=_MOST_STEPS
     )

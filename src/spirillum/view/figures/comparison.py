@@ -169,17 +169,13 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
         add_letters(panels)
         for axes, panel in zip(panels, _PANELS, strict=True):
             _draw(axes, comparison, panel)
-        names = comparison.models
+        # A star where a result contains calibration factors.
+        fitted = [name for name, answer in comparison.predictions.items() if answer.calibrated]
+        names = [f"{name}*" if name in fitted else name for name in comparison.models]
         for axes in sheet.panels[:, 0]:
-            axes.set_yticks(range(len(names)), [_label(comparison, name) for name in names])
+            axes.set_yticks(range(len(names)), names)
             axes.set_ylim(len(names) - 0.45, -0.55)
         return sheet.finished()
-
-
-def _label(comparison: ModelComparison, name: str) -> str:
-    """A model's name, with a star if its result contains calibration factors."""
-    answer = comparison.predictions.get(name)
-    return f"{name}*" if answer is not None and answer.calibrated else name
 
 
 def _notes(comparison: ModelComparison) -> list[str]:
@@ -198,11 +194,6 @@ def _notes(comparison: ModelComparison) -> list[str]:
         found.append("*With calibration factors on the body's drag, which represent the channel's walls.")
     found += [f"No result: {plain(why, 400)}" for why in comparison.refusals.values()]
     return found
-
-
-def _signed_percent(share: float) -> str:
-    digits = 1 if abs(share) < 0.0995 else 0
-    return f"{100 * share:+.{digits}f} %".replace("-", "−")
 
 
 def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
@@ -224,8 +215,9 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
             axes.errorbar(value, row, xerr=bar, color="black", capsize=5, elinewidth=0.9, capthick=0.9, zorder=6)
         axes.plot(value, row, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
         if name != comparison.reference and reference != 0:
+            share = value / reference - 1.0
             axes.annotate(
-                _signed_percent(value / reference - 1.0),
+                f"{100 * share:+.{1 if abs(share) < 0.0995 else 0}f} %".replace("-", "−"),
                 (value * (1 + (error or 0.0)), row),
                 xytext=(6 if value >= 0 else -6, 0),
                 textcoords="offset points",

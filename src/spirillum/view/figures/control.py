@@ -46,7 +46,8 @@ def control_figure(control: Control) -> Figure:
         _residuals(panels[1], control, target, around)
         _commands(panels[2], control)
         for axes in panels:
-            _shade(axes, control)
+            if pulse is not None:
+                axes.axvspan(pulse.start, pulse.end, color="#555555", alpha=0.15, linewidth=0)
         panels[-1].set_xlim(0.0, float(time[-1]))
         panels[-1].set_xlabel("time (s)")
         return sheet.finished()
@@ -145,9 +146,3 @@ def _commands(axes: Axes, control: Control) -> None:
     axes.step(data["time"].values, data["duty"].values, where="pre", color=COLOURS["blue"], linewidth=1.0)
     axes.set_ylim(-0.08, 1.08)
     axes.set_ylabel("duty")
-
-
-def _shade(axes: Axes, control: Control) -> None:
-    pulse = control.drawn.pulse
-    if pulse is not None:
-        axes.axvspan(pulse.start, pulse.end, color="#555555", alpha=0.15, linewidth=0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -49,21 +48,22 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         fine, turning, lag = _held(dataset)
         advance = float(dataset["held_forward_velocity"][0] / dataset["held_tail_rotation_rate"][0])
         panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)
-        _points(panels[0], rate, speeds(speed), "blue")
+        panels[0].plot(rate, speeds(speed), color=COLOURS["blue"], **_POINTS)
         panels[0].set_ylabel(f"forward velocity ({speeds.unit})")
         panels[1].plot(fine, turning, **_HELD)
-        _points(panels[1], rate, dataset["tail_rotation_rate"].values / Hz, "vermillion")
+        panels[1].plot(rate, dataset["tail_rotation_rate"].values / Hz, color=COLOURS["vermillion"], **_POINTS)
         panels[1].set_ylabel("rate of the robot (Hz)")
         low, high = (np.rad2deg(dataset[f"{name}_wobble_angle"].values) for name in ("least", "largest"))
         panels[2].fill_between(rate, low, high, color=COLOURS["green"], alpha=0.25, linewidth=0)
-        _points(panels[2], rate, np.rad2deg(dataset["wobble_angle"].values), "green")
+        panels[2].plot(rate, np.rad2deg(dataset["wobble_angle"].values), color=COLOURS["green"], **_POINTS)
         panels[2].set_ylabel("wobble: robot's axis to field's (deg)")
         panels[2].set_ylim(0.0, max(1.0, 1.05 * float(high.max())))
         panels[3].plot(fine, np.rad2deg(lag), **_HELD)
-        _points(panels[3], rate, np.rad2deg(dataset["phase_lag"].values), "purple")
+        panels[3].plot(rate, np.rad2deg(dataset["phase_lag"].values), color=COLOURS["purple"], **_POINTS)
         panels[3].set_ylabel("moment behind field (deg)")
         panels[3].set_ylim(0.0, 95.0)
-        _step_out(panels, float(dataset["step_out_rate"]) / Hz * float(np.sign(rate[0])))
+        for axes in panels:
+            axes.axvline(float(dataset["step_out_rate"]) / Hz * float(np.sign(rate[0])), **_STEP_OUT)
         for axes in panels[2:]:
             axes.set_xlabel("rotation rate of the field (Hz)")
         return sheet.finished()
@@ -78,12 +78,3 @@ def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
     slipping = size - np.sqrt(np.where(follows, 0.0, size**2 - step_out**2))
     turning = np.where(follows, size, slipping)
     return sense * size, sense * turning, np.where(follows, np.arcsin(np.minimum(size / step_out, 1.0)), np.nan)
-
-
-def _points(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
-    axes.plot(x, y, color=COLOURS[colour], **_POINTS)
-
-
-def _step_out(panels: Samples, rate: float) -> None:
-    for axes in panels:
-        axes.axvline(rate, **_STEP_OUT)

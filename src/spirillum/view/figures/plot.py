@@ -79,8 +79,11 @@ def plot(answer: Any) -> Plot:
     import xarray as xr
 
     with styled():
+        for kind, draw in _FIGURES.items():
+            if isinstance(answer, kind):
+                return Plot(draw(answer))
         if not isinstance(answer, xr.Dataset):
-            return Plot(_of_answer(answer))
+            raise InputError(f"answer = {type(answer).__name__} has no figure; allowed: {_ALLOWED}")
         try:
             return Plot(_of_dataset(answer))
         except KeyError as error:
@@ -111,13 +114,6 @@ _ALLOWED = (
     "a robot, or what predict, compare_models, study, simulate, magnetic_sweep, settle, design, flow, control, measure "
     "or calibrate returns"
 )
-
-
-def _of_answer(answer: Any) -> Figure:
-    for kind, draw in _FIGURES.items():
-        if isinstance(answer, kind):
-            return draw(answer)
-    raise InputError(f"answer = {type(answer).__name__} has no figure; allowed: {_ALLOWED}")
 
 
 def _of_dataset(dataset: xr.Dataset) -> Figure:
