@@ -417,8 +417,7 @@ def _deviations(values: Samples) -> Samples:
     known = values[np.isfinite(values)]
     if known.size < _FEWEST_TRIALS or np.median(known) == 0:
         return np.full(values.shape, np.nan)
-    found: Samples = values / np.median(known) - 1.0
-    return found
+    return values / np.median(known) - 1.0
 
 
 _FEWEST_PAIRS = 10

@@ -112,8 +112,7 @@ class Forward:
         body, tail = rates_per_torque(balance, friction_torques("rotor", friction, friction))
         per_current = motor.joint_torque_constant * (tail - body)
         current = steady_current(motor, np.zeros(1), motor.joint_back_emf_constant * per_current)
-        found: Samples = motor.polarity * per_current * current
-        return found
+        return motor.polarity * per_current * current
 
     def friction(
         self, draws: Draws, motor_rate: Samples, tail_share: Samples | None = None, reading: str = "rotor"
@@ -126,15 +125,13 @@ class Forward:
         turning = kinematics(s).turning
         torque, tail, rate = self._at_motor_rate(turning, draws, motor_rate, tail_share)
         body = turning * tail if reading == "rotor" else s.body_rate_as_printed(torque, tail)
-        found: Samples = (torque - s.rotor_load(body, tail)) / rate
-        return found
+        return (torque - s.rotor_load(body, tail)) / rate
 
     def printed_turning(self, draws: Draws, motor_rate: Samples, tail_share: Samples) -> Samples:
         """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates, (draws, robots)."""
         s = self.balance(draws)
         torque, tail, _ = self._at_motor_rate(kinematics(s).turning, draws, motor_rate, tail_share)
-        found: Samples = s.body_rate_as_printed(torque, tail) / tail
-        return found
+        return s.body_rate_as_printed(torque, tail) / tail
 
     def _at_motor_rate(
         self, turning: Samples, draws: Draws, motor_rate: Samples, tail_share: Samples | None

@@ -91,8 +91,7 @@ def _noise(problem: Problem, name: Quantity, error: float) -> Samples:
     """Variance of each mean: that of its trials, and the floor `LEAST_ERROR`."""
     ratio = problem.ratio(name)
     floor = max(LEAST_ERROR, problem.interpolation_error) * ratio.scale
-    found: Samples = ratio.error_of_mean(error) ** 2 + floor**2
-    return found
+    return ratio.error_of_mean(error) ** 2 + floor**2
 
 
 def least_squares_fit(problem: Problem) -> LeastSquares:

@@ -130,8 +130,7 @@ def _starts(density: Density, fit: LeastSquares, walkers: int, rng: np.random.Ge
             size = value if np.isfinite(value) and value > 0 else 0.02
             share = float(np.clip(erf((max(size, 0.003) / scale) / np.sqrt(2.0)), 1e-9, 1.0 - 1e-9))
             centre[count + offset + n] = float(np.clip(ndtri(share), -3.0, 3.0))
-    found: Samples = np.clip(centre + width * rng.normal(size=(walkers, density.size)), -6.0, 6.0)
-    return found
+    return np.clip(centre + width * rng.normal(size=(walkers, density.size)), -6.0, 6.0)
 
 
 class _Ensemble:

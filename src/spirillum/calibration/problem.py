@@ -172,8 +172,7 @@ class Problem:
 
     def _own(self, name: str) -> Samples:
         """A constant of the robots' fluid or motor, SI, (robots,) or (1,)."""
-        found: Samples = self.forward.viscosity if name == "viscosity" else getattr(self.forward.electrics, name)
-        return found
+        return self.forward.viscosity if name == "viscosity" else getattr(self.forward.electrics, name)
 
     def printed_turning(self, z: Samples) -> Samples:
         """Omega/omega of every robot by (19) as printed, at its observed motor rate, (draws, robots)."""

@@ -79,8 +79,7 @@ class Condition(NamedTuple):
     def excess(self, values: Samples) -> Samples:
         """By how much values break it, relative to the bound (to 1 where that is 0); 0 or less where they keep it."""
         scale = abs(self.bound) or 1.0
-        found: Samples = (values - self.bound) / scale if self.relation == "<=" else (self.bound - values) / scale
-        return found
+        return (values - self.bound) / scale if self.relation == "<=" else (self.bound - values) / scale
 
     @property
     def words(self) -> str:
@@ -208,8 +207,7 @@ class Variable(NamedTuple):
         if self.is_whole:
             count = self.high - self.low + 1.0
             return self.low + np.minimum(np.floor(share * count), count - 1.0)
-        found: Samples = self.low + share * (self.high - self.low)
-        return found
+        return self.low + share * (self.high - self.low)
 
     def share(self, value: float) -> float:
         """Position of a value in its range; of a whole number the middle of its interval."""

@@ -193,8 +193,7 @@ class Evaluation:
 
     def quantity(self, motion: Swimming, name: str) -> Samples:
         """A quantity of what `motion` returns, (designs, draws)."""
-        found: Samples = np.asarray(getattr(motion, name)).reshape(-1, self.samples.number)
-        return found
+        return np.asarray(getattr(motion, name)).reshape(-1, self.samples.number)
 
     def scores(self, shares: Samples) -> DesignScores:
         """Objective values of designs by shares of the ranges, (designs, variables); infeasible ones are skipped."""

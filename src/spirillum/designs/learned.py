@@ -306,8 +306,7 @@ def _first_designs(empty: Evaluation, own: tuple[Variable, ...], seed: int) -> S
         )
     most = int(np.count_nonzero(able < len(corners))) + _FEWEST + _FOR_EACH * len(own)
     _, kept = np.unique(np.round(shares[able], 9), axis=0, return_index=True)
-    found: Samples = shares[able[np.sort(kept)][:most]]
-    return found
+    return shares[able[np.sort(kept)][:most]]
 
 
 def _solved(

@@ -114,10 +114,9 @@ def group_of(file: h5netcdf.File, group: str | None = None) -> xr.Dataset:
     import xarray as xr
     from xarray.backends import H5NetCDFStore
 
-    found: xr.Dataset = xr.open_dataset(
+    return xr.open_dataset(
         H5NetCDFStore(file if group is None else file[group]), decode_times=False, cache=False
     ).load()
-    return found
 
 
 def _check(stored: h5py.File, path: Path, what: str, largest: int) -> None:

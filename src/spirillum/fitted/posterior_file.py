@@ -311,8 +311,7 @@ def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generato
     off = _ALONE * rng.normal(size=size)
     if count > 1:
         off = float(logs.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count) * rng.standard_t(count - 1, size=size)
-    found: Samples = middle * np.exp(np.clip(off, -np.log(_FACTOR), np.log(_FACTOR)))
-    return found
+    return middle * np.exp(np.clip(off, -np.log(_FACTOR), np.log(_FACTOR)))
 
 
 def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Samples]) -> str:

@@ -162,8 +162,7 @@ class SimulationThread:
         """The plane of the flow around a robot; None if there is none."""
         with self._lock:
             flowing = self._swimmers[index].flowing if 0 <= index < len(self._swimmers) else None
-        plane: dict[str, Any] | None = None if flowing is None else flowing.progress().get("plane")
-        return plane
+        return None if flowing is None else flowing.progress().get("plane")
 
     # the thread of the simulation
 

@@ -264,8 +264,7 @@ def _names(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _flat(chosen: xr.Dataset, name: str, names: list[str]) -> Values:
-    found: Values = chosen[name].transpose(*robot_dims(chosen)).values.astype(float).reshape(len(names))
-    return found
+    return chosen[name].transpose(*robot_dims(chosen)).values.astype(float).reshape(len(names))
 
 
 def _ends(chosen: xr.Dataset, known: list[str], names: list[str]) -> tuple[dict[str, Values], dict[str, Values], str]:

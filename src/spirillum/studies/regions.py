@@ -75,8 +75,7 @@ class Layout:
     def indices(self, region: RobotBlock) -> Indices:
         """Indices of a region's robots in the flat order of the study."""
         along = [np.arange(first, last) for first, last in zip(region.start, region.stop, strict=True)]
-        found: Indices = np.ravel_multi_index(np.meshgrid(*along, indexing="ij"), self.shape).ravel()
-        return found
+        return np.ravel_multi_index(np.meshgrid(*along, indexing="ij"), self.shape).ravel()
 
 
 def layout_of(loaded: LoadedStudy) -> Layout:

@@ -296,5 +296,4 @@ def _cables(count: int, seed: int, size: tuple[int, int]) -> Samples:
             lineType=cv2.LINE_AA,
             shift=4,
         )
-    found: Samples = (cover / 255.0)[..., None]
-    return found
+    return (cover / 255.0)[..., None]

@@ -145,8 +145,7 @@ def _range(values: Values, unit: str, scale: float = 1.0) -> str:
 
 def _of_tails(average: Callable[..., Any], values: Values) -> Values:
     """An average over the robots of a reading, (readings,); NaN where it has none."""
-    found: Values = np.ma.filled(average(np.ma.masked_invalid(values), axis=0), np.nan)
-    return found
+    return np.ma.filled(average(np.ma.masked_invalid(values), axis=0), np.nan)
 
 
 def _reynolds_numbers(readings: FrictionModelRuns) -> Iterator[Claim]:

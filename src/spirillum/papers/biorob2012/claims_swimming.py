@@ -271,8 +271,7 @@ def _at_observed(evidence: Evidence, name: str, model: str) -> Values:
     readings = [str(reading) for reading in evidence.dataset["friction"].values]
     reading = "rotor" if "rotor" in readings else readings[0]
     chosen = evidence.dataset[f"{name}_at_observed_rate"].sel(model=model, friction=reading, channel=["wide", "narrow"])
-    values: Values = chosen.values
-    return values
+    return chosen.values
 
 
 def motor_rates(evidence: Evidence) -> Iterator[Claim]:

@@ -100,14 +100,12 @@ class Evidence:
     def free(self, name: str, model: str, channel: str | None = None) -> Values:
         """A quantity of free swimming at the friction-free bound, (wavelength, amplitude) or both channels first."""
         chosen = self.dataset[name].sel(model=model, friction=self.bound)
-        values: Values = chosen.sel(channel=channel or ["wide", "narrow"]).values
-        return values
+        return chosen.sel(channel=channel or ["wide", "narrow"]).values
 
     def seen(self, name: str, channel: str | None = None) -> Values:
         """An observed quantity, (wavelength, amplitude) or with both channels first."""
         chosen = self.dataset[f"observed_{name}"]
-        values: Values = chosen.sel(channel=channel or ["wide", "narrow"]).values
-        return values
+        return chosen.sel(channel=channel or ["wide", "narrow"]).values
 
     def complete(self, *names: str) -> bool:
         """Whether these quantities were observed of every tail in both channels."""
@@ -212,8 +210,7 @@ class FrictionModelRuns:
         """Whether all steps are positive, in each reading: 1, 0, or NaN if none is finite, (readings,)."""
         flat = steps.reshape(-1, steps.shape[-1])
         known = np.isfinite(flat)
-        found: Values = np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)
-        return found
+        return np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)
 
     def verdict_on(self, holds: Values) -> Judgement:
         """The verdict on a statement about all robots, 1, 0 or NaN in each reading; it stays open without a table."""

@@ -356,8 +356,7 @@ def _half_width(found: Calibrated, name: Quantity) -> Samples:
     """Half width of the 95 % interval of each observed mean."""
     ratio = found.problem.ratio(name)
     error = found.error.get(name, ratio.pooled_error)
-    half: Samples = 1.96 * ratio.error_of_mean(error)
-    return half
+    return 1.96 * ratio.error_of_mean(error)
 
 
 def _draw(axes: Axes, found: Calibrated, row: dict[str, Any], here: np.ndarray) -> None:

@@ -70,8 +70,7 @@ class _View:
 
     def values(self, name: str) -> Values:
         """A variable, SI, rows upwards."""
-        found: Values = np.asarray(self.plane[name].values, dtype=float).T
-        return found
+        return np.asarray(self.plane[name].values, dtype=float).T
 
     def continued(self, values: Values) -> Values:
         """Values extrapolated into the solids, which are plotted above: avoids a fringe of cells without colour."""

@@ -64,8 +64,7 @@ def crests(robot: Robot, phase: float, unit: float) -> Values:
     x = (0.5 * np.pi - phase + 2 * np.pi * number) * tail.wavelength / (2 * np.pi) * hand
     settled = 0.0 if tail.taper is None else 4.0 * tail.length / tail.taper
     inside = (x <= -root - min(settled, 0.5 * tail.length)) & (x >= -root - tail.length)
-    found: Values = np.sort(x[inside] / unit)[::-1]
-    return found
+    return np.sort(x[inside] / unit)[::-1]
 
 
 def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: float, points: float) -> None:

@@ -164,8 +164,7 @@ class StudyView:
 
     def values(self, name: str, **labels: str) -> Values:
         """A quantity of this part for some model or reading, SI."""
-        found: Values = np.asarray(self.dataset[name].sel(labels).values, dtype=float)
-        return found
+        return np.asarray(self.dataset[name].sel(labels).values, dtype=float)
 
     def scale(self, unit: str, *names: str, **labels: str | list[str]) -> UnitPrefix:
         """One scale for some quantities all over the study."""
