@@ -69,9 +69,9 @@ class Note(str):
 
     @classmethod
     def named(cls, name: str, /, **values: Any) -> Note:
-        """The note of `sentences.csv` under a name, with values in its sentence and fields."""
+        """The note of `sentences.csv` under a name, with values in its sentence; `fields` where they vary."""
         row = _SENTENCES[name]
-        fields = row["fields"].format(**values).split()
+        fields = values["fields"] if row["fields"] == "{fields}" else row["fields"].format(**values).split()
         return cls(row["code"], row["sentence"].format(**values), fields)
 
     def __getnewargs__(self) -> tuple[str, str, tuple[str, ...]]:  # type: ignore[override]

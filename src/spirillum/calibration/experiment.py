@@ -253,14 +253,7 @@ def _copies(items: Sequence[ObservationRow]) -> list[Note]:
     for item in items:
         numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate)
         alike.setdefault(repr(numbers), []).append(item.row)
-    return [
-        Note(
-            "intervals-incomplete",
-            f"rows {', '.join(map(str, rows))} are equal in every number: copies of a trial make intervals too small",
-        )
-        for rows in alike.values()
-        if len(rows) > 1
-    ]
+    return [Note.named("copied-trials", rows=", ".join(map(str, rows))) for rows in alike.values() if len(rows) > 1]
 
 
 def _check_direction(path: Path, items: Sequence[ObservationRow]) -> None:
@@ -404,11 +397,9 @@ def _outlying_trials(
         for group, own in zip(groups, deviations, strict=True):
             for item, off in zip(group, own.tolist(), strict=False):
                 if np.isfinite(off) and abs(off) > max(_FAR_OFF * scale, _LEAST_OFF):
-                    words = (
-                        f"row {item.row}, column {column}: {1.0 + off:.3g} times the median of its tail's trials, each "
-                        "over its own rate; check the number"
+                    found.append(
+                        Note.named("outlying-trial", row=item.row, column=column, times=1.0 + off, fields=(column,))
                     )
-                    found.append(Note("outlier", words, (column,)))
     return tuple(found)
 
 

@@ -178,7 +178,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         posterior=None,
         identifiability=None,
         warnings=(
-            Note("intervals-incomplete", "method 'paper' gives no uncertainty; use --method posterior", ("method",)),
+            Note.named("no-uncertainty"),
             *outlier_warnings(problem, z),
             *prior_warnings(problem, z),
             *factor_misfit_warnings(problem, z),
@@ -210,7 +210,7 @@ def _by_draws(
         of_a_trial = {name: float(np.median(every[f"error_{name}"])) for name in problem.quantities}
         values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
         discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
-        unusable = [Note("posterior-unusable", f"do not use the posterior: {words}") for words in posterior.problems()]
+        unusable = [Note.named("posterior-not-usable", words=words) for words in posterior.problems()]
         unusable += edge_warnings(problem, free)
     given, within, friction = _friction(problem, z, middle, error, reading, rng)
     sensitivity = friction_sensitivity(problem, middle, reading)

@@ -20,12 +20,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robust import mad_scale
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
 
-RATES_IN_RADIANS = Note(
-    "units-doubtful",
-    "the motor is too weak for most tails, most often by a unit: check that rates are in Hz and not in rad/s "
-    "(6.3 times)",
-    ("tail_rate_Hz", "body_rate_Hz", "motor_rate_Hz"),
-)
+RATES_IN_RADIANS = Note.named("rates-in-radians")
 """Caution where most of the robots would need more torque than their motors give."""
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 """Name of each compared quantity in a sentence."""
@@ -132,8 +127,8 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
         misfit = min(size.value, fit.discrepancy[name])  # by the residuals, and not the prior alone
         few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).seen) == 1
         if (few or one) and misfit > _BEYOND_TRIALS:
-            words = f"'{model}' misses the {called} by {percent(fit.discrepancy[name])}: the fit does not describe it"
-            found.append(Note("misfit", words, (name,)))
+            share = percent(fit.discrepancy[name])
+            found.append(Note.named("factors-miss", model=model, called=called, share=share, fields=(name,)))
         if few:
             words = (
                 f"the fit has as many free numbers as means of the {called}: the misfit of '{model}' is unknown, and a "
@@ -183,11 +178,8 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[Note]:
     """Assumptions of a fit about the friction."""
     unset = all(robot.friction.effective is None for robot in problem.experiment.robots)
     if problem.by_motor_rate and unset and "shared_friction" not in problem.free:
-        words = (
-            "friction.effective is unset, and B_m alone acts: further friction goes into "
-            f"{', '.join(name for name in problem.free if name != 'friction')}; free shared_friction too"
-        )
-        return [Note("friction-assumed", words, ("friction.effective",))]
+        others = ", ".join(name for name in problem.free if name != "friction")
+        return [Note.named("friction-into-others", others=others)]
     if reading != "paper" or "friction" not in problem.free:
         return []
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -195,11 +187,7 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[Note]:
     known = ratio[np.isfinite(ratio)]
     if known.size == 0 or np.all(np.abs(known - 1.0) < _PRINTED):
         return []
-    words = (
-        f"with (19) as printed the body turns at {np.median(known):.2g} times its observed rate ({known.min():.2g} to "
-        f"{known.max():.2g}): B_eff does not reproduce it; use --friction rotor"
-    )
-    return [Note("friction-assumed", words, ("friction.reading", "turning"))]
+    return [Note.named("printed-body-rate", median=np.median(known), least=known.min(), most=known.max())]
 
 
 def friction_interval_warnings(problem: Problem) -> list[Note]:
@@ -236,7 +224,7 @@ def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) ->
 
 def synthetic_warning(source: str) -> Note:
     """The note of every answer from synthetic observations."""
-    return Note("synthetic", f"{source} says that its numbers are synthetic: nothing here is measured")
+    return Note.named("synthetic-observations", source=source)
 
 
 def inertia_warnings(experiment: Experiment) -> list[Note]:
@@ -256,32 +244,18 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note
     if experiment.synthetic:
         found.append(synthetic_warning(experiment.source))
     if "gap" in problem.free and "pitch" not in problem.free:
-        words = (
-            "robots are assumed level, and another pitch changes speeds and the fitted gap; free both (--free "
-            "gap,pitch)"
-        )
-        found.append(Note("pose-unknown", words, ("pitch",)))
+        found.append(Note.named("pitch-assumed"))
     negative = [n for n, item in enumerate(friction) if item.value < 0]
     if negative:
-        words = (
-            f"B_eff is negative for {len(negative)} of {len(friction)} robots ({experiment.labels()[negative[0]]}, "
-            "...): the model's torque exceeds the motor's; predictions use zero"
-        )
-        found.append(Note("friction-negative", words, ("friction",)))
+        first = experiment.labels()[negative[0]]
+        found.append(Note.named("torque-beyond-motor", count=len(negative), robots=len(friction), first=first))
         if 2 * len(negative) > len(friction):
             found.append(RATES_IN_RADIANS)
     open_below = [n for n, item in enumerate(friction) if item.low < 0 <= item.value]
     if open_below:
-        words = (
-            f"B_eff of {experiment.labels()[open_below[0]]}{', ...' if len(open_below) > 1 else ''} may be zero or "
-            "less, which has no meaning: the observations do not determine it; repeat trials"
-        )
-        found.append(Note("friction-negative", words, ("friction",)))
+        more = ", ..." if len(open_below) > 1 else ""
+        found.append(Note.named("friction-open-below", first=experiment.labels()[open_below[0]], more=more))
     if problem.interpolation_error > 0:
         where = "at poses between the nodes" if problem.model.placed else "at one wire between the nodes"
-        words = (
-            f"resistances are interpolated, with an error of up to {percent(problem.interpolation_error)}, checked "
-            f"{where}"
-        )
-        found.append(Note("interpolated", words))
+        found.append(Note.named("interpolated-resistances", error=percent(problem.interpolation_error), where=where))
     return found

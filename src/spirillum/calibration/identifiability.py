@@ -125,20 +125,12 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     if len(named) == 1:
         if abs(z[named[0]]) > FAR:  # `prior_warnings` reports it
             return None
-        words = (
-            f"{labels[0]} is hardly identifiable: the observations say {known} about it; fix it or state its "
-            "uncertainty"
-        )
-        return Note("not-identifiable", words, labels)
+        return Note.named("hardly-known", label=labels[0], known=known, fields=labels)
     moved = z + 0.5 * direction * np.sign(direction[named[0]])
     before, after = problem.values_at(z), problem.values_at(moved)
     changes = [f"{label} by {100 * (after[label] / before[label] - 1.0):+.2g} %" for label in labels]
     effect = f"{0.5 * singular:.1g}" if singular > 2e-3 else "less than 0.001"
-    words = (
-        f"{_listed(changes)} trade off: together they move predictions by {effect} standard errors, and the "
-        f"observations say {known}; fix one"
-    )
-    return Note("not-identifiable", words, labels)
+    return Note.named("trade-off", changes=_listed(changes), effect=effect, known=known, fields=labels)
 
 
 def _listed(items: Sequence[str]) -> str:

@@ -156,17 +156,17 @@ def suggest(
         on_progress("candidates", place, len(listed))
         outside = _outside(known, robot, answer)
         if outside:
-            left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {outside}"))
+            left_out.append(Note.named("candidate-left-out", robot=tail_words(robot), outside=outside))
             continue
         seen = drawn_kinematics(robot, model, known) if answer == HELD else _trial_kinematics(known, robot)
         if isinstance(seen, str):
-            left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {seen}"))
+            left_out.append(Note.named("candidate-left-out", robot=tail_words(robot), outside=seen))
             continue
         found.append(_candidate(known, robot, trials, seen, numbers, names))
     if not found:
         raise InputError(f"no candidate can be built and answered: {left_out[0]}")
     if len(left_out) > _SAID:
-        left_out[_SAID:] = [Note("without-answer", f"{len(left_out) - _SAID} more candidates are left out")]
+        left_out[_SAID:] = [Note.named("candidates-left-out", count=len(left_out) - _SAID)]
     ordered = sorted(found, key=lambda pair: -pair[0].gain)
     best, of_best = ordered[0]
     return Suggestion(

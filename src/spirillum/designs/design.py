@@ -316,20 +316,11 @@ def _warnings(
     known, built = unknowns.robot, _built(unknowns.robot, stated.space, best)
     if given.channel is not None and stated.model.name == "tube":
         gap = gap_of(Placement(), given.body.diameter, 0.5 * given.channel.diameter)
-        words = (
-            f"all designs have the reference pose (gap {1e3 * gap:.4g} mm, level); `spirillum predict` gives the band"
-        )
-        found.append(Note("reference-pose", words, ("placement.gap", "placement.pitch")))
+        found.append(Note.named("reference-pose-of-designs", gap=1000.0 * gap))
     elif given.channel is not None and stated.model.name in known.calibration:
-        words = (
-            "all designs have the same drag factors in place of walls, which may change their order; predict with tube"
-        )
-        found.append(Note("reference-pose", words, ("calibration",)))
+        found.append(Note.named("one-calibration-for-all"))
     elif given.channel is not None:
-        words = (
-            "wall effects are not modelled: speeds are too high, and the order may change; predict the best with tube"
-        )
-        found.append(Note("walls-left-out", words, ("model", "channel")))
+        found.append(Note.named("designs-without-walls"))
     if stated.model.name in known.calibration:
         found += calibration_warnings(built, stated.model.name)
     reading = friction_reading(given.friction.reading)
@@ -341,8 +332,7 @@ def _warnings(
     found += [limit.caution() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
     found += reynolds_warnings(limits).values()
     if any("end of its range" in words for words in bound_by):
-        words = "the best design lies at the end of a range; widen the range"
-        found.append(Note("design-at-limit", words))
+        found.append(Note.named("end-of-a-range"))
     return tuple(dict.fromkeys(found))
 
 
@@ -354,8 +344,4 @@ def _near_step_out(robot: Robot, motion: Swimming) -> list[Note]:
     if not share > _MOST_OF_STEP_OUT:
         return []
     room = show(1.2 * abs(robot.magnetic.rotation_rate), "Hz")
-    words = (
-        f"the field turns at {100 * share:.3g} % of the best design's step-out rate, beyond which it slips; "
-        f"--subject-to 'step_out_rate >= {room}' leaves room"
-    )
-    return [Note("field-slips", words, ("magnetic.rotation_rate", "step_out_rate"))]
+    return [Note.named("design-near-step-out", share=100 * share, room=room)]

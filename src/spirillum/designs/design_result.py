@@ -311,19 +311,11 @@ def lead_warnings(answer: Design) -> tuple[Note, ...]:
             continue
         lead = sign * (best - other.objective) / abs(best)
         if lead < -_ALIKE and other.name == "today":
-            words = (
-                f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best one within them by "
-                f"{percent(-lead)}; widen the ranges"
-            )
-            notes += (Note("design-at-limit", words),)
+            notes += (Note.named("today-is-better", other=ALTERNATIVES[other.name], lead=percent(-lead)),)
         elif lead < error[0]:
             leads.setdefault(error, []).append(f"{_SHORT[other.name]} by {percent(lead)}")
     return notes + tuple(
-        Note(
-            "design-tie",
-            f"the best design leads {' and '.join(led)}, within the error of {percent(error)} {of}; they may be equal",
-            ("objective",),
-        )
+        Note.named("tied-designs", names=" and ".join(led), error=percent(error), of=of)
         for (error, of), led in leads.items()
     )
 
@@ -335,8 +327,7 @@ def _without_effect(answer: Design) -> tuple[Note, ...]:
         known = profile.objective[np.isfinite(profile.objective)]
         if known.size > 1 and np.ptp(known) <= _ALIKE * np.abs(known).max():
             name = answer.objectives[0].name.replace("_", " ")
-            words = f"the {name} does not depend on {profile.path}: every value of the range is as good"
-            found.append(Note("design-tie", words, (profile.path,)))
+            found.append(Note.named("field-without-effect", name=name, path=profile.path, fields=(profile.path,)))
     return tuple(found)
 
 

@@ -29,27 +29,13 @@ from spirillum.units import show
 
 _COEFFICIENTS = ("normal_factor", "tangential_factor")  # fitted fields that act on `rft` alone
 
-FITTED_HELD = Note(
-    "fit-other-motion",
-    "the posterior was fitted to robots held at a pose, and this one moves freely: its intervals need not contain the "
-    "fitted observations",
-)
+FITTED_HELD = Note.named("posterior-of-held")
 """Caution of a free motion in the tube with a posterior."""
-FITTED_TRIAL = Note(
-    "fit-other-motion",
-    "the posterior was fitted to trials: the held answer has its median and no interval; --interval gives the trial's",
-)
+FITTED_TRIAL = Note.named("posterior-of-trials")
 """Caution of a held answer with a posterior of trials."""
-FITTED_BESIDE = Note(
-    "fit-other-motion",
-    "the fit is of robots held at a pose: compare its observations with the column held, not with trial; fit robots "
-    "that were released by `calibrate --as trial`",
-)
+FITTED_BESIDE = Note.named("fit-beside-trial")
 """Caution of a trial beside a held answer with a fit of held robots: it may be many times slower."""
-CALIBRATED_HELD = Note(
-    "fit-other-motion",
-    "the calibration was fitted to robots held at a pose, and this one moves freely: it need not swim as observed",
-)
+CALIBRATED_HELD = Note.named("calibration-of-held")
 """Caution of a free motion in the tube with a calibration file."""
 
 
@@ -133,9 +119,11 @@ class Fit:
         instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
         idle = [model for model in models if not any(self.serves(robot, model, friction=friction) for robot in robots)]
         return [
-            Note(
-                "fit-not-used",
-                f"nothing in {self.name or 'the calibration'} is for {self._not_for(robots, model)}: {instead}",
+            Note.named(
+                "fit-serves-nobody",
+                fit=self.name or "the calibration",
+                whom=self._not_for(robots, model),
+                instead=instead,
             )
             for model in idle
         ]
@@ -163,8 +151,7 @@ class Fit:
         if self.posterior is None or self.posterior.acts_on(robot, walls=model.placed, friction=friction):
             return []
         whom = self._not_for([robot], model)
-        words = f"nothing in {self.name} is for {whom}: the robot's own numbers are used, and it gives no interval"
-        return [Note("fit-not-used", words)]
+        return [Note.named("posterior-serves-nobody", fit=self.name, whom=whom)]
 
     def acting_on(self, robot: Robot, model: SwimmerModel) -> tuple[Fit, list[Note]]:
         """Return the fit, or none and a note where draws of a posterior leave the robot's answer as it is."""
@@ -187,8 +174,8 @@ class Fit:
             return []
         what = "its values" if self.posterior is None else "its values and intervals"
         name = self._file_name.partition(" (")[0]
-        words = f"{name} is used outside its geometry, {apart}: {what} may not hold; recalibrate"
-        return [Note("calibration-outside", words, (apart.partition(" = ")[0],))]
+        field = apart.partition(" = ")[0]
+        return [Note.named("fit-outside-geometry", name=name, apart=apart, what=what, fields=(field,))]
 
     def _difference(self, robot: Robot) -> str:
         """The first size of a robot's channel and body that is none of the fitted ones; empty where all are."""
@@ -215,8 +202,7 @@ class Fit:
         pairs = ((robot, model) for robot in robots for model in models)
         if not self.synthetic or not any(self.serves(*pair, friction=friction) for pair in pairs):
             return []
-        words = f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
-        return [Note("synthetic", words)]
+        return [Note.named("fit-of-synthetic", observations=self.synthetic)]
 
     def torque_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[Note]:
         """Whether B_eff is used with another friction model or model than those that it was inferred with."""
@@ -227,11 +213,7 @@ class Fit:
             others = [name for name in used if name != own]
             if self.friction and own and others:
                 named = " and ".join(f"'{name}'" for name in (others if what == "model" else others[:1]))
-                words = (
-                    f"B_eff was inferred with {what} '{own}' and is another torque with {named}: rates and speeds do "
-                    f"not follow from the observations; use '{own}'"
-                )
-                found.append(Note("friction-other-fit", words, ("friction.effective",)))
+                found.append(Note.named("torque-of-another-fit", what=what, own=own, named=named))
         return found
 
     def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[Note]:
@@ -258,15 +240,11 @@ class Fit:
         if own is not None and own > 0:
             return []
         if own is not None:
-            words = "the calibrated B_eff of this tail is negative; zero is used: rates and speeds are upper bounds"
-            return [Note("friction-negative", words, ("friction.effective",))]
+            return [Note.named("friction-of-tail-negative")]
         if not others:
             return []
-        words = (
-            f"B_eff of this tail was not fitted: the median of {len(others)} fitted tails is used, "
-            f"{np.median(others):.4g} N m s/rad (range {min(others):.4g} to {max(others):.4g})"
-        )
-        return [Note("friction-not-fitted", words, ("friction.effective",))]
+        median, least, most = np.median(others), min(others), max(others)
+        return [Note.named("friction-of-others", count=len(others), median=median, least=least, most=most)]
 
     def tails_warnings(self, robots: Sequence[Robot]) -> list[Note]:
         """How many robots have a B_eff that was not fitted, or is negative."""
@@ -279,8 +257,7 @@ class Fit:
             words += ", and intervals include their spread" if self.posterior else ""
             sentences.append(Note("friction-not-fitted", words, ("friction.effective",)))
         if zero:
-            words = f"the calibrated B_eff of {zero} of {len(robots)} tails is negative: zero is used"
-            sentences.append(Note("friction-negative", words, ("friction.effective",)))
+            sentences.append(Note.named("friction-of-tails-negative", zero=zero, robots=len(robots)))
         return sentences
 
 

@@ -130,8 +130,7 @@ def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
             first = task.robots[int(missing[0])]
             outside = broken(requirements(first, find_swimmer_model(task.model)))
             why = outside[0].sentence() if outside else "they find no steady motion there"
-            words = f"{task.model}: the band leaves out {missing.size} robots at {task.where}, the first: {why}"
-            found.append(Note("without-answer", words))
+            found.append(Note.named("band-leaves-out", model=task.model, count=missing.size, where=task.where, why=why))
     return found
 
 
@@ -256,15 +255,12 @@ def trial_notes(answers: Sequence[tuple[TrialTask, Part]]) -> list[Note]:
     """Assumptions of the trials, and the robots without one."""
     if not answers:
         return []
-    words = f"trial: {ASSUMPTION}; released, 60 s of waiting, 20 s with the motor on, as `spirillum predict` has it"
-    found = [Note("settled-basis", words, ("contact",))]
+    found = [Note.named("trial-basis", assumption=ASSUMPTION)]
     lost = [task for task, part in answers if part["state"][0] == 0.0]
     if lost:
-        words = (
-            f"{len(lost)} of {len(answers)} robots have no trial, the first: {lost[0].robot.with_tail}; "
-            "`spirillum predict` gives the reason"
+        found.append(
+            Note.named("robots-without-trial", count=len(lost), robots=len(answers), first=lost[0].robot.with_tail)
         )
-        found.append(Note("without-answer", words, ("forward_velocity_trial",)))
     return found
 
 

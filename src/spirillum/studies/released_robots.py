@@ -234,11 +234,7 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
     known = np.concatenate([part.ravel() for part in found]) if found else np.ones(0, dtype=bool)
     if known.all():
         return []
-    words = (
-        f"{np.count_nonzero(~known)} of {known.size} runs of released robots have no answer: they leave their "
-        "table; use other ranges in [laid_down]"
-    )
-    return [Note("without-answer", words, ("laid_down",))]
+    return [Note.named("runs-without-answer", count=np.count_nonzero(~known), runs=known.size)]
 
 
 SETTLED = (*MOVING, "shaft_power", "hydrodynamic_efficiency")  #: Quantities of a steady motion.
@@ -295,11 +291,7 @@ def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[
 def settled_basis(contact: Contact) -> Note:
     """What settled speeds are, and rest on."""
     height = "1e-4 of its radius" if contact.roughness is None else show_height(contact.roughness)
-    words = (
-        f"settled speeds assume asperities of {height} and a friction coefficient of {contact.friction_coefficient:g}; "
-        "a trial of some turns does not reach them"
-    )
-    return Note("settled-basis", words, ("contact",))
+    return Note.named("settled-basis", height=height, friction=contact.friction_coefficient)
 
 
 def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
@@ -309,23 +301,15 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
     near = [task for task, part in answers if part["near"][0] == 1.0 and task not in far]
     found = []
     if far:
-        words = (
-            f"{len(far)} of {len(answers)} robots yaw further than their tables were checked for: settled speeds have "
-            f"no error estimate; the first: {far[0].robot.with_tail}"
-        )
-        found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
+        found.append(Note.named("yaw-not-checked", count=len(far), robots=len(answers), first=far[0].robot.with_tail))
     if near:
-        words = (
-            f"{len(near)} of {len(answers)} robots come nearer to the wall than their tables were checked for: there "
-            f"each is {BELOW}; the first: {near[0].robot.with_tail}"
+        found.append(
+            Note.named(
+                "gap-not-checked", count=len(near), robots=len(answers), below=BELOW, first=near[0].robot.with_tail
+            )
         )
-        found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
     if lost:
-        words = (
-            f"{len(lost)} of {len(answers)} robots have no steady motion that could be found, the first: "
-            f"{lost[0].robot.with_tail}; `spirillum settle` gives the reason"
-        )
-        found.append(Note("without-answer", words, ("settled_forward_velocity",)))
+        found.append(Note.named("not-settled", count=len(lost), robots=len(answers), first=lost[0].robot.with_tail))
     return found
 
 

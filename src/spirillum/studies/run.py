@@ -211,8 +211,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     """What to be careful about in the question."""
     warnings = _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
-        words = "friction.effective is unset: only B_m acts: rates and speeds are upper bounds; set it, or calibrate"
-        warnings.append(Note("friction-unset", words, ("friction.effective",)))
+        warnings.append(Note.named("friction-unset"))
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
         warnings.append(CONSTANT_TORQUE)
     requested = [find_swimmer_model(name) for name in loaded.study.models]
@@ -232,22 +231,14 @@ def _pose_notes(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Not
     """Limits of answers for robots held at a pose in their tube."""
     walled = [model.name for model in models if model.placed]
     if not walled:
-        words = "band = true has no effect: no model of the study includes walls; add model tube"
-        return [Note("input-unused", words, ("band",))] if loaded.study.band else []
-    words = (
-        "robots are held at a pose: in free motion they are slower, perhaps in another order; --settled finds that "
-        "motion"
-    )
-    held = Note("settled-basis", words, ("placement",))
+        return [Note.named("band-without-walls")] if loaded.study.band else []
+    held = Note.named("robots-are-held")
     placements = loaded.placements or (loaded.study.placement,)
     found = {name: model.name for model in models for place in placements for name in left_open(place, model)}
     if loaded.study.band or not found:
         return [] if loaded.study.settled else [held]
     are = "are" if len(found) > 1 else "is"
-    words = (
-        f"{' and '.join(found)} {are} unknown: answers are for one pose, and the order may change; --band adds others"
-    )
-    one_place = Note("pose-unknown", words, tuple(found))
+    one_place = Note.named("one-pose-of-many", names=" and ".join(found), are=are, fields=tuple(found))
     return [one_place] if loaded.study.settled else [one_place, held]
 
 

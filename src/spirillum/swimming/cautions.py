@@ -68,7 +68,7 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
     if not differing:
         return []
     more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
-    fields = " ".join(words.partition(" = ")[0] for words in differing)
+    fields = [words.partition(" = ")[0] for words in differing]
     return [Note.named("calibrated-elsewhere", model=model, differs=differing[0], more=more, fields=fields)]
 
 
@@ -82,7 +82,7 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     if not has_table(batch) and not why_no_table(batch):
         whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
         more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
-    return [Note.named("pose-open", open=named, more=more, fields=" ".join(over))]
+    return [Note.named("pose-open", open=named, more=more, fields=over)]
 
 
 CONSTANT_TORQUE = Note.named("constant-torque")

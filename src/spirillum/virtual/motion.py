@@ -81,8 +81,7 @@ def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[Note, ...]:
     """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none."""
     if robot.channel is None or find_swimmer_model(choice.model).placed:
         return ()
-    words = f"wall effects are not modelled by '{choice.model}': the film shows too fast a robot; use model '{WALLED}'"
-    return (Note("walls-left-out", words, ("model", "channel")),)
+    return (Note.named("film-without-walls", model=choice.model, walled=WALLED),)
 
 
 def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:
@@ -158,11 +157,7 @@ def _between_samples(trajectory: TrialTrajectory) -> tuple[Note, ...]:
     step = float(np.abs(np.diff(trajectory.tail_phase)).max())
     if step <= _LARGEST_STEP:
         return ()
-    words = (
-        f"the tail turns by up to {np.degrees(step):.3g} deg between samples of the run: the video shows interpolated "
-        "poses; use more samples_per_turn"
-    )
-    return (Note("drawn-otherwise", words, ("timing.samples_per_turn",)),)
+    return (Note.named("interpolated-poses", angle=np.degrees(step)),)
 
 
 def _clearance(robot: Robot) -> float:

@@ -288,10 +288,7 @@ def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens)
     if seen == 1.0:
         return ()
     length = trajectory.duration
-    words = (
-        f"the robot is in the picture for {seen * length:.3g} of {length:.3g} s: it swims out of it; shorten the trial"
-    )
-    return (Note("out-of-picture", words, ("duration",)),)
+    return (Note.named("robot-swims-out", seen=seen * length, length=length),)
 
 
 def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> None:

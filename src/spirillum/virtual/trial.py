@@ -311,8 +311,7 @@ def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[
     plain = Degradation(crf=degradation.crf)
     if not seed or degradation != plain or troubles.uses_seed:
         return []
-    words = f"seed = {seed} has no effect: nothing in this video is random; add a degradation such as noise or bubbles"
-    return [Note("input-unused", words, ("seed",))]
+    return [Note.named("idle-seed", seed=seed)]
 
 
 def _stated_height(height: float, error: float, surface: float) -> float:

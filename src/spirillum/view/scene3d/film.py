@@ -320,7 +320,4 @@ def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[
     if turn <= _LARGEST_TURN:
         return turn, ()
     slower = round_length(speed * _LARGEST_TURN / turn)
-    words = (
-        f"the tail turns by up to {turn:.2g} turns a frame and may seem to stand or reverse; use a speed of {slower:g}"
-    )
-    return turn, (Note("aliased-film", words, ("speed",)),)
+    return turn, (Note.named("tail-aliased", turn=turn, slower=slower),)
