@@ -16,7 +16,7 @@ import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.start import start_state
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels import core, rigid_links
+from spirillum.kernels import core
 from spirillum.robot.placement import Placement
 
 TURNS = 100.0
@@ -54,7 +54,7 @@ def main() -> None:
         weight=True,
         roughness=None,
     )
-    data, no_table, dy = links.data, links.table, np.empty(rigid_links.STATES)
+    data, no_table, dy = links.data, links.table, np.empty(core.STATE_SIZE)
 
     def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
         core.rates(dy, t, y, data, no_table)

@@ -25,7 +25,7 @@ from spirillum.fluid.tube.outer_resistance import NodeSolution, solutions
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import RESPONSES, response_errors
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.kernels.tube_table import INSIDE
+from spirillum.kernels.core import INSIDE
 from spirillum.robot.tube_pose import TubePose
 
 _PHASES = 3

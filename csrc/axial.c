@@ -25,20 +25,6 @@
 #endif
 #include "axial.h"
 
-#include "drive.h"
-
-/* One robot, SI; torques and rates at the joint: the columns of spirillum/kernels/motor.py. */
-typedef struct {
-    Motor motor;
-    double speed, body, tail;                /* U, Omega, omega per joint torque */
-    double speed_flow, body_flow, tail_flow; /* U, Omega, omega per imposed mean flow */
-} AxialRobot;
-
-typedef struct {
-    double current, position, tail_angle, body_angle, charge;
-    double squared_current, heat; /* integrals of I^2, A^2 s, and of R I^2, J */
-} AxialState;
-
 enum { BLOCK = 64 };                    /* robots of one block: their columns stay in the processor's cache */
 static const double PER_CONSTANT = 2.0; /* pieces of a step for each time constant L/R of the motor at rest */
 static const double FEWEST = 28.0;      /* and besides; errors below 1e-6 (tested) */
@@ -80,11 +66,11 @@ static inline double slope(const Block *b, int64_t k, double i, double r) {
 }
 
 /* Fill a block; the largest rate L/R among its robots, 1/s. */
-static double open_block(Block *b, const AxialRobot *robots, const AxialState *states, const double *duty,
+static double open_block(Block *b, const Axial *robots, const AxialState *states, const double *duty,
                          const double *flow, int64_t width) {
     double fastest = 0.0;
     for (int64_t k = 0; k < width; k++) {
-        const AxialRobot *p = robots + k;
+        const Axial *p = robots + k;
         const Motor *m = &p->motor;
         const double over = 1.0 / m->inductance, slip = p->tail - p->body;
         const double driven = m->polarity * duty[k] / m->inductance;
@@ -144,7 +130,7 @@ static double integrate_block(Block *b, int64_t width, double dt, double fastest
 }
 
 /* Add a step to a robot, whose current was steady during `rest` at its end; `carried` is the way of the fluid. */
-static void close_step(const Block *b, int64_t k, const AxialRobot *p, AxialState *state, double duty, double carried,
+static void close_step(const Block *b, int64_t k, const Axial *p, AxialState *state, double duty, double carried,
                        double rest) {
     const double i = b->current[k], charge = b->charge[k] + i * rest, squares = b->squares[k] + i * i * rest;
     const double loss = b->heat[k] + resistance(b, k, i) * i * i * rest; /* all resistance times I^2, over L */
@@ -169,7 +155,7 @@ EXPORT void advance_axial(const double *parameters /* (count, 18) */, double *st
     Block block;
     for (int64_t low = 0; low < count; low += BLOCK) {
         const int64_t width = count - low < BLOCK ? count - low : BLOCK;
-        const AxialRobot *robots = (const AxialRobot *)parameters + low;
+        const Axial *robots = (const Axial *)parameters + low;
         AxialState *own = (AxialState *)states + low;
         const double fastest = open_block(&block, robots, own, duty + low, flow + low, width);
         const double rest = integrate_block(&block, width, dt, fastest, fineness);
@@ -184,7 +170,7 @@ EXPORT void advance_on_curve(const double *parameters /* (count, 18) */, double 
                              const double *duty /* (count) */, const double *flow /* (count) */,
                              const double *curve /* (25) */, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        const AxialRobot *p = (const AxialRobot *)parameters + n;
+        const Axial *p = (const Axial *)parameters + n;
         AxialState *state = (AxialState *)states + n;
         const double sense = p->motor.polarity, coasting = sense * (p->tail_flow - p->body_flow) * flow[n];
         const double torque = sense * curve_torque((const Curve *)curve, duty[n], coasting, p->tail - p->body);
@@ -199,7 +185,7 @@ EXPORT void advance_on_curve(const double *parameters /* (count, 18) */, double 
 /* Derivative of the state of one robot at a current, A, a duty and an imposed mean flow, m/s. */
 EXPORT void axial_rates(const double *parameters /* (18) */, double current, double duty, double flow,
                         double *out /* (7) */) {
-    const AxialRobot *p = (const AxialRobot *)parameters;
+    const Axial *p = (const Axial *)parameters;
     const Motor *m = &p->motor;
     const double torque = m->torque_constant * current, square = current * current;
     const double tail = p->tail * torque + p->tail_flow * flow, body = p->body * torque + p->body_flow * flow;

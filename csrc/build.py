@@ -48,6 +48,13 @@ _EXPORTED = re.compile(
     r"/\*(?P<doc>(?:(?!\*/).)*)\*/\nEXPORT (?P<type>\w+) (?P<name>\w+)\((?P<arguments>(?!void).*?)\) \{", re.DOTALL
 )
 _ARGUMENT = re.compile(r"(?:const )?(?P<type>\w+) (?P<name>[^/]*?)\s*(?:/\* \((?P<shape>.*?)\) \*/)?,")
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_ENUM = re.compile(r"\benum \{(.*?)\}", re.DOTALL)
+_STRUCT = re.compile(r"^typedef struct \{(.*?)^\} (\w+);", re.DOTALL | re.MULTILINE)
+_FIELDS = re.compile(r"(struct|union) \{(.*?)\}(.*?);|(\w+) (.*?);", re.DOTALL)
+_COLUMNS = ("State", "Seen", "Drive", "Weight", "Site", "Wire", "Station", "Wall", "Ring", "Tube", "Limits", "Memory")
+_COLUMNS += ("Motor", "Loaded", "Axial", "AxialState")
+"""Structs of numbers that Python packs or reads: the place of each field becomes a constant."""
 _NUMBERS = {"void": "None", "double": "float", "int64_t": "int", "bool": "bool"}
 _ARRAYS = {"float": "Float32", "int64_t": "Int64", "uint8_t": "UInt8", "Amplitude": "Complex128"}  # else of doubles
 
@@ -108,9 +115,47 @@ def stubs() -> str:
         "from __future__ import annotations\n",
         "from spirillum.kernels.native import Array, Complex128, Float32, Float64, Int64, UInt8, native\n",
     ]
+    found += [f"{name} = {value}" for name, value in _constants().items()]
     for path in sorted(SOURCES.glob("*.c")):
         found += [_stub(exported, path.name) for exported in _EXPORTED.finditer(path.read_text(encoding="utf-8"))]
     return "\n".join(found)
+
+
+def _constants() -> dict[str, int]:
+    """Return the enumerators of headers, and the places of fields in structs and the sizes of these: STATE_PHASE."""
+    text = _COMMENT.sub("", "".join(path.read_text(encoding="utf-8") for path in sorted(SOURCES.glob("*.h"))))
+    structs = {name: body for body, name in _STRUCT.findall(text)}
+    found: dict[str, int] = {}
+    for listed in _ENUM.findall(text):
+        for number, one in enumerate(listed.split(",")):
+            name, _, value = (part.strip() for part in one.partition("="))
+            if not value or value.isdigit():
+                found[name] = int(value or number)
+    for name in _COLUMNS:
+        prefix = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).upper()
+        found[f"{prefix}_SIZE"] = _add_places(found, prefix, structs, structs[name], 0)
+    return found
+
+
+def _add_places(
+    found: dict[str, int], prefix: str, structs: dict[str, str], fields: str, begin: int, *, overlap: bool = False
+) -> int:
+    """Note the places of fields, one after the other or in a union; return the end of the longest."""
+    place = end = begin
+    for group, inner, names, kind, plain in _FIELDS.findall(fields):
+        for declared in (plain or names).split(","):
+            name, *sizes = re.findall(r"\w+", declared) or [""]
+            start, length = begin if overlap else place, 1
+            if name:
+                found[f"{prefix}_{name.upper()}"] = start
+            if kind != "double":
+                own = inner or structs[kind]
+                length = _add_places(found, prefix, structs, own, start, overlap=group == "union") - start
+            for size in sizes:
+                length *= int(found.get(size, size))
+            place = start + length
+            end = max(end, place)
+    return end
 
 
 def _stub(exported: re.Match[str], source: str) -> str:

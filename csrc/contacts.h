@@ -6,7 +6,7 @@
 #include "lanes.h"
 #include "links.h"
 
-/* A site on body or coupling: a ring about the motor axis that carries a ball; the columns of kernels/contacts.py. */
+/* A site on body or coupling: a ring about the motor axis that carries a ball */
 typedef struct {
     double x, ring, half, ball; /* place; rho, with the semi-axis b along the motor axis; radius beta; m */
     double rotor;               /* 1 where it turns with the rotor */

@@ -48,7 +48,7 @@ EXPORT void edge_points(const double pose[3], const double *factors /* (8, 5, 4,
  *
  * pose: x, y, heading; factors: coefficients of the edge points, as in `edge_points`; normals: outward normals in the
  * body's frame; reach: largest distances of the lens along and across, m; axis_height: height of the axis, m; camera:
- * packed, see `kernels.pictures`; pixels: the edge points; directions: unit normals in the picture; size: pixels per m
+ * of snell.h; pixels: the edge points; directions: unit normals in the picture; size: pixels per m
  * along them; slopes: Jacobian of the displacement along each normal by (x, y, heading), pixels per m and per rad. */
 EXPORT void edge_places(const double pose[3], const double *factors /* (8, 5, 4, count) */,
                         const double (*normals)[2] /* (count, 2) */, const double reach[2], double axis_height,

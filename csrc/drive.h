@@ -20,6 +20,12 @@ typedef struct {
     double polarity;                                                /* sign of the driven rate about +x */
 } Motor;
 
+/* A motor under a load: back-emf without a current, V, and what a current adds to it, V/A. */
+typedef struct {
+    Motor motor;
+    double duty, back_emf, back_emf_per_current;
+} Loaded;
+
 enum { MOST_POINTS = 12, MOST_TRIALS = MOST_POINTS + 2 }; /* at a point rounding may lead to and fro */
 
 /* Torque against rate in the motor's own sense: rates rise from 0, torques do not, and the last one is 0. The first torque

@@ -2,7 +2,7 @@
  *
  * Weight and buoyancy, the field on a magnetic moment, the drive's torque, the motor's current and the powers are the
  * same wherever the robot swims; a robot without walls (two_links.c) and one in its tube (tube_motion.c) differ in the
- * fluid, the wall and their solution. The structs are rows of the arrays of spirillum/kernels/rigid_links.py; SI.
+ * fluid, the wall and their solution. SI.
  */
 #ifndef SPIRILLUM_LINKS_H
 #define SPIRILLUM_LINKS_H

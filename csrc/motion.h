@@ -5,7 +5,7 @@
 #include "slices.h"
 #include "table.h"
 
-/* The channel's wall of a robot without a tube; the columns of kernels/two_links.py. */
+/* The channel's wall of a robot without a tube. */
 typedef struct {
     double radius, roughness, stiffest, load; /* m (infinite: none); m; largest resistance of a film, N s/m; N */
 } Wall;
@@ -28,7 +28,7 @@ typedef struct {
 
 enum { CLOSED, OPEN, IMPOSED }; /* kinds of ends */
 
-/* The columns of kernels/tube_motion.py. */
+/* A tube with its asperities, its dry friction and its fluid. */
 typedef struct {
     double radius, roughness, load; /* R, m; s, m; load at half of it, N */
     double coefficient, sliding;    /* mu_c; v_r, m/s */

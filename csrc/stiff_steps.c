@@ -298,7 +298,7 @@ static bool has_crossed(double *gaps, const double *now, int64_t count) {
 
 /* Write the time derivative of a state into `dy`, and what is observed to the begin of `data`.
  *
- * dy: derivative of the state, the result; time: s; y: the state, see the constants of `rigid_links`; data: from
+ * dy: derivative of the state, the result; time: s; y: `State`; data: from
  * `packed` of `tube_motion` or `two_links`; its rates are where the solution begins; table: the robot's table, (0,) for
  * one without a tube. */
 EXPORT void rates(double *dy /* (19) */, double time, const double *y /* (19) */, double *data /* (size) */,

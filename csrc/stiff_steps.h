@@ -1,4 +1,4 @@
-/* What Python, and the FMU of a free robot, call of stiff_steps.c; see there, and spirillum/kernels/stiff_steps.py. */
+/* What Python, and the FMU of a free robot, call of stiff_steps.c; see there. */
 #ifndef SPIRILLUM_STIFF_STEPS_H
 #define SPIRILLUM_STIFF_STEPS_H
 

@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 import posteriors
 import spirillum as sp
 from spirillum.kernels import core
-from spirillum.kernels import motor as kernel
 
 WIDE = "biorob2012-wide"
 IN_FLOW: dict[str, Any] = {"gap": "0.5 mm", "pitch": 0.0, "flow": 0.0}
@@ -39,20 +38,20 @@ def integrated(p: np.ndarray, cycles: list[tuple[float, float]]) -> np.ndarray:
     """States after times at duties: (17) and its integrals by the Dormand-Prince method of order 8, to 1e-11."""
 
     def winding(i: float) -> float:
-        bends = p[kernel.DECAY] * np.exp(-p[kernel.DECAY_RATE] * i) + p[kernel.GROWTH] * np.exp(
-            p[kernel.GROWTH_RATE] * i
+        bends = p[core.AXIAL_DECAY] * np.exp(-p[core.AXIAL_DECAY_RATE] * i) + p[core.AXIAL_GROWTH] * np.exp(
+            p[core.AXIAL_GROWTH_RATE] * i
         )
-        return float(p[kernel.CONSTANT] + bends + p[kernel.SLOPE] * i)
+        return float(p[core.AXIAL_CONSTANT] + bends + p[core.AXIAL_SLOPE] * i)
 
     def rates(_time: float, y: np.ndarray, duty: float) -> list[float]:
-        i, torque, supply = abs(y[0]), p[kernel.TORQUE] * y[0], p[kernel.POLARITY] * duty
-        voltage = supply * (p[kernel.VOLTAGE] - p[kernel.INTERNAL] * i)
-        emf = p[kernel.EMF] * (p[kernel.TAIL] - p[kernel.BODY]) * torque
-        of_current = (voltage - winding(i) * y[0] - emf) / p[kernel.INDUCTANCE]
-        path = [p[name] * torque for name in (kernel.SPEED, kernel.TAIL, kernel.BODY)]
+        i, torque, supply = abs(y[0]), p[core.AXIAL_TORQUE_CONSTANT] * y[0], p[core.AXIAL_POLARITY] * duty
+        voltage = supply * (p[core.AXIAL_VOLTAGE] - p[core.AXIAL_INTERNAL_RESISTANCE] * i)
+        emf = p[core.AXIAL_BACK_EMF] * (p[core.AXIAL_TAIL] - p[core.AXIAL_BODY]) * torque
+        of_current = (voltage - winding(i) * y[0] - emf) / p[core.AXIAL_INDUCTANCE]
+        path = [p[name] * torque for name in (core.AXIAL_SPEED, core.AXIAL_TAIL, core.AXIAL_BODY)]
         return [of_current, *path, supply * y[0], y[0] ** 2, winding(i) * y[0] ** 2]
 
-    state = np.zeros(kernel.STATES)
+    state = np.zeros(core.AXIAL_STATE_SIZE)
     for time, duty in cycles:
         found = solve_ivp(
             rates, (0, time), state, "DOP853", args=(duty,), rtol=1e-11, atol=1e-20, first_step=1e-4 * time
@@ -102,9 +101,9 @@ def test_error_falls_with_the_fourth_power_of_the_pieces() -> None:
     robots = sp.AxialBatch(WIDE, 1, model="rft")
     charges = []
     for fineness in (0.5, 1.0, 2.0, 16.0):
-        state = np.zeros((1, kernel.STATES))
+        state = np.zeros((1, core.AXIAL_STATE_SIZE))
         core.advance_axial(robots.numbers, state, 1 / 30, np.ones(1), np.zeros(1), fineness)
-        charges.append(state[0, kernel.CHARGE])
+        charges.append(state[0, core.AXIAL_STATE_CHARGE])
     errors = np.abs(np.array(charges[:3]) / charges[3] - 1.0)
     assert errors[1] < 3e-6
     assert np.all(np.log2(errors[:-1] / errors[1:]) > 3.5)
@@ -137,13 +136,13 @@ def test_ranges_are_kept_and_seeds_repeat() -> None:
     first, again, other = (sp.AxialBatch(WIDE, 200, model="rft", ranges=ranges, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.numbers, again.numbers)
     assert not np.array_equal(first.numbers, other.numbers)
-    voltage = first.numbers[:, kernel.VOLTAGE]
+    voltage = first.numbers[:, core.AXIAL_VOLTAGE]
     assert 3.3 <= voltage.min() < 3.35
     assert 3.65 < voltage.max() <= 3.7
     first.step(0.1)
     first.reset(np.arange(200) < 50)
     assert not first.states[:50].any()
-    assert np.all(first.states[50:, kernel.POSITION] > 0)
+    assert np.all(first.states[50:, core.AXIAL_STATE_POSITION] > 0)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +209,7 @@ def test_robots_of_a_posterior_are_those_of_predict(tmp_path: Path) -> None:
     speeds = many.observe()["forward_velocity"]
     assert len(np.unique(speeds)) > 100
     assert 0.005 < speeds.std() / speeds.mean() < 0.2
-    assert np.all(many.numbers[:, kernel.VOLTAGE] == 3.7)
+    assert np.all(many.numbers[:, core.AXIAL_VOLTAGE] == 3.7)
 
 
 def test_earlier_name_still_works_with_a_warning() -> None:

@@ -6,16 +6,29 @@ from scipy.spatial.transform import Rotation
 
 import spirillum as sp
 from spirillum.dynamics.plant import Plant
-from spirillum.kernels.core import field_at
-from spirillum.kernels.rigid_links import AXIS_Y, AXIS_Z, DRIVE, FIELD, FIELD_PHASE, FIELD_RATE
+from spirillum.kernels.core import (
+    DRIVE_AXIS_Y,
+    DRIVE_AXIS_Z,
+    DRIVE_FIELD,
+    DRIVE_FIELD_PHASE,
+    DRIVE_FIELD_RATE,
+    DRIVE_SIZE,
+    field_at,
+)
 
 
 @pytest.mark.parametrize(("yaw", "pitch"), [(0.0, 0.0), (0.3, 0.0), (-0.2, 0.5)])
 def test_the_field_is_that_about_x_rotated_to_its_axis(yaw: float, pitch: float) -> None:
     """It keeps its strength, is at right angles to its axis, and turns about it at its rate."""
     axis = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    drive = np.zeros(DRIVE)
-    drive[[FIELD, FIELD_RATE, FIELD_PHASE, AXIS_Y, AXIS_Z]] = 2.0, 3.0, 0.4, axis[1], axis[2]
+    drive = np.zeros(DRIVE_SIZE)
+    drive[[DRIVE_FIELD, DRIVE_FIELD_RATE, DRIVE_FIELD_PHASE, DRIVE_AXIS_Y, DRIVE_AXIS_Z]] = (
+        2.0,
+        3.0,
+        0.4,
+        axis[1],
+        axis[2],
+    )
     times = np.linspace(0.0, 2.0, 9)
     found = np.empty((9, 3))
     for row, time in zip(found, times, strict=True):

@@ -18,7 +18,7 @@ from spirillum.dynamics.tube_simulation import compare_with_check
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import least_checked_gap
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels import core
 from spirillum.kernels.core import largest_yaw
 from spirillum.robot.batch import RobotBatch
 
@@ -69,7 +69,7 @@ def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> Non
     lying = motion.run.lying
     turns = ReturnMap(motion.robot, 1.0)
     state = motion.run.start.copy()
-    rest = float(observed_at(motion.robot, state)[kernel.AZIMUTH])
+    rest = float(observed_at(motion.robot, state)[core.SEEN_AZIMUTH])
     cos, sin = np.cos(0.002), np.sin(0.002)
     state[1:3] = cos * state[1] - sin * state[2], sin * state[1] + cos * state[2]
     state[3:7] = _turned_about_x(state[3:7], 0.002)
@@ -77,7 +77,7 @@ def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> Non
     for _ in range(100):
         turn = turns.after(state)
         state, time = turn.state, time + turn.time
-        away.append((time, float(observed_at(motion.robot, state)[kernel.AZIMUTH]) - rest))
+        away.append((time, float(observed_at(motion.robot, state)[core.SEEN_AZIMUTH]) - rest))
     late = np.array(away[75:])
     slope = np.polyfit(late[:, 0], np.log(np.abs(late[:, 1])), 1)[0]
     assert -1.0 / slope == pytest.approx(lying.approach_time, rel=0.02)

@@ -10,7 +10,7 @@ from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.rotating_field import _settled
 from spirillum.dynamics.timing import Switch
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 MOMENT, FIELD = 1.0, 2.0
@@ -18,10 +18,10 @@ MOMENT, FIELD = 1.0, 2.0
 
 def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
     """A made-up body of revolution that feels nothing but its own rotation; SI."""
-    drive = np.zeros(rigid_links.DRIVE)
-    drive[[rigid_links.KIND, rigid_links.FIXED, rigid_links.DUTY]] = rigid_links.MAGNETIC, 1.0, 1.0
-    drive[rigid_links.MOMENT : rigid_links.FIELD] = MOMENT * np.cos(angle), 0.0, MOMENT * np.sin(angle)
-    drive[rigid_links.FIELD] = FIELD
+    drive = np.zeros(core.DRIVE_SIZE)
+    drive[[core.DRIVE_KIND, core.DRIVE_FIXED, core.DRIVE_DUTY]] = core.MAGNETIC, 1.0, 1.0
+    drive[core.DRIVE_MOMENT : core.DRIVE_FIELD] = MOMENT * np.cos(angle), 0.0, MOMENT * np.sin(angle)
+    drive[core.DRIVE_FIELD] = FIELD
     drag = np.diag([1.0, 1.0, 1.0, along, across, across, 1.0])
     return TwoLinks(
         friction=np.zeros((7, 7)),
@@ -39,13 +39,13 @@ def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
 def run_at(links: TwoLinks, rate: float, turns: float) -> np.ndarray:
     """Angle of the moment behind the field about x."""
     drive = links.drive.copy()
-    drive[rigid_links.FIELD_RATE] = rate
+    drive[core.DRIVE_FIELD_RATE] = rate
     here = replace(links, drive=drive)
-    start = np.zeros(rigid_links.STATES)
-    start[rigid_links.ATTITUDE] = 1.0
+    start = np.zeros(core.STATE_SIZE)
+    start[core.STATE_ATTITUDE] = 1.0
     time = np.linspace(0.0, turns * 2 * np.pi / rate, int(20 * turns))
     run = integrate(here, start, time, [Switch(0.0, 1.0)], NOWHERE)
-    return np.asarray(rate * run.time - run.states[:, rigid_links.ROLL])
+    return np.asarray(rate * run.time - run.states[:, core.STATE_ROLL])
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,7 @@ from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube
 from spirillum.errors import InputError
-from spirillum.kernels import contacts, core, rigid_links
-from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels import core
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
 from spirillum.swimming.prediction import Prediction, predict
@@ -161,7 +160,7 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
     across = 0.009 * 0.02 / 0.011
     c = 3.5 * 3.0 * np.sqrt(2.0) * np.pi * across**1.5 * LENGTH
     law = (2e-4**-0.5 + 0.5 * 0.02 / c * time) ** -2
-    np.testing.assert_allclose(found.observed[:, rigid_links.FILM], law, rtol=2e-6)
+    np.testing.assert_allclose(found.observed[:, core.SEEN_FILM], law, rtol=2e-6)
 
 
 def test_robot_at_rest_lies_on_its_asperities_with_its_weight(made: Any) -> None:
@@ -209,12 +208,12 @@ def test_energy_is_balanced_with_contact(made: Any, coefficient: float, drive: s
 
 def test_energy_is_balanced_in_a_flow_and_with_open_ends(made: Any) -> None:
     flow = np.array([[0.0, 0.0], [1.0, 2e-3], [2.5, -1e-3], [4.0, 1e-3]])
-    _, _, run = made(Surroundings(roughness=2e-4, ends=kernel.IMPOSED, flow=flow))
+    _, _, run = made(Surroundings(roughness=2e-4, ends=core.IMPOSED, flow=flow))
     found = run(at(gap=1.5e-4), 5.0)
     np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], *flow.T), atol=1e-15)
     assert left_of_energy(found) < 1e-6
     assert abs(float(found["flow_energy"][-1])) > 1e-9
-    _, _, run = made(Surroundings(roughness=2e-4, ends=kernel.OPEN, length=0.37))
+    _, _, run = made(Surroundings(roughness=2e-4, ends=core.OPEN, length=0.37))
     found = run(at(gap=1.5e-4), 3.0)
     assert left_of_energy(found) < 1e-6
     speed = float(found["forward_velocity"][-1])
@@ -226,12 +225,12 @@ def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
     speeds = []
     for around in (
         Surroundings(),
-        Surroundings(ends=kernel.OPEN, length=1e9),
-        Surroundings(ends=kernel.OPEN, length=0),
+        Surroundings(ends=core.OPEN, length=1e9),
+        Surroundings(ends=core.OPEN, length=0),
     ):
         _, links, _ = made(around)
         state = state_at_release(made()[0].robot, links, *at(gap=5e-4))
-        state[rigid_links.CURRENT] = 0.05
+        state[core.STATE_CURRENT] = 0.05
         speeds.append(observed_at(links, state)[0])
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-9)
     assert speeds[2] > speeds[0]
@@ -295,8 +294,8 @@ def test_rates_solve_the_balance(made: Any) -> None:
     for gap in (3e-4, 1e-4, 3e-5):
         for current in (0.0, 1e-3, 0.05):
             state = state_at_release(steady.robot, links, *at(gap=gap, pitch=0.002, yaw=0.01))
-            state[rigid_links.CURRENT] = current
-            assert observed_at(links, state)[kernel.BALANCE] < 1e-12
+            state[core.STATE_CURRENT] = current
+            assert observed_at(links, state)[core.SEEN_BALANCE] < 1e-12
     rng = np.random.default_rng(3)
     for _ in range(300):
         half = rng.normal(size=(7, 7)) * 10.0 ** rng.uniform(-1, 1, 7)
@@ -319,7 +318,7 @@ def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
     _, links, _ = made()
 
     def state_of(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        state = np.zeros(rigid_links.STATES)
+        state = np.zeros(core.STATE_SIZE)
         state[:3] = place + attitude.apply(step[:3])
         turned = attitude * Rotation.from_rotvec(step[3:6])
         state[3:7] = turned.as_quat(scalar_first=True)
@@ -357,7 +356,7 @@ def test_gap_of_a_site_is_that_of_its_points(made: Any) -> None:
     for x, ring, half, ball, turning in sites:
         for angles in ((0.4, 0.1, -0.07), (0.0, 0.02, 0.3), (2.0, -0.2, 0.05)):
             turned = Rotation.from_euler("xyz", angles)
-            state = np.zeros(rigid_links.STATES)
+            state = np.zeros(core.STATE_SIZE)
             state[:3] = (0.0, 4e-3, -6e-3)
             lat = latitude if half else np.zeros(1)
             across = ring * np.cos(lat)[:, None] * np.stack([np.cos(theta), np.sin(theta)])[:, None, :]
@@ -379,7 +378,7 @@ def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
         state = state_at_release(robot, links, *at(gap=3e-4, pitch=pitch))
         smallest = np.inf
         for phase in np.linspace(0.0, 2 * np.pi, 9):
-            state[rigid_links.PHASE] = phase
+            state[core.STATE_PHASE] = phase
             found = links.gaps(state)[-1]
             xi = np.linspace(0.0, 0.06, 20001)
             r = 0.0025 * (1 - np.exp(-100 * xi / 0.06))
@@ -421,7 +420,7 @@ def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float
     state = state_at_release(steady.robot, links, *at(gap=3e-4, pitch=pitch))
     found, true = [], []
     for phase in np.linspace(0.0, 2 * np.pi, 7):
-        state[rigid_links.PHASE] = phase
+        state[core.STATE_PHASE] = phase
         y = points[:, 1] * np.cos(phase) - points[:, 2] * np.sin(phase)
         z = points[:, 1] * np.sin(phase) + points[:, 2] * np.cos(phase)
         up = state[2] + points[:, 0] * np.sin(pitch) + z * np.cos(pitch)
@@ -445,12 +444,12 @@ def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
     helix = made(overrides={"tail.taper": "none"}, model="rft")
     gaps = []
     for steady, links, _ in (curve, helix):
-        own = links.stations[np.argmin(links.stations[:, contacts.STATION_XI])]
-        turn = np.arctan2(own[contacts.STATION_POINT + 2], own[contacts.STATION_POINT + 1])
+        own = links.stations[np.argmin(links.stations[:, core.STATION_XI])]
+        turn = np.arctan2(own[core.STATION_POINT + 2], own[core.STATION_POINT + 1])
         state = state_at_release(steady.robot, links, *near_the_wall(*curve[:2]))
         row = []
         for phase in np.linspace(0.0, 2 * np.pi, 9):
-            state[rigid_links.PHASE] = phase - turn
+            state[core.STATE_PHASE] = phase - turn
             row.append(links.gaps(state)[-1])
         gaps.append(row)
     assert np.isfinite(gaps[0]).sum() > 2
@@ -471,23 +470,23 @@ def test_asperities_do_not_vanish_with_the_weight(made: Any) -> None:
     density = 985.0
     robot = sp.load("biorob2012-wide")
     heavy = made()[1]
-    weight = float(heavy.weight[: rigid_links.MOMENT_BODY].sum())
-    assert heavy.tube[kernel.LOAD] == pytest.approx(weight, rel=1e-9)
+    weight = float(heavy.weight[: core.WEIGHT_MOMENT_BODY].sum())
+    assert heavy.tube[core.TUBE_LOAD] == pytest.approx(weight, rel=1e-9)
     floating = {"body.mass": f"{robot.body.mass - weight / 9.80665!r} kg", "fluid.density": f"{density} kg/m^3"}
     light, none = made(overrides=floating)[1], made(weight=False)[1]
-    assert abs(float(light.weight[: rigid_links.MOMENT_BODY].sum())) < 1e-4 * weight
-    assert light.tube[kernel.LOAD] == pytest.approx(none.tube[kernel.LOAD], rel=1e-9)
-    assert none.tube[kernel.LOAD] > 0.1 * weight
+    assert abs(float(light.weight[: core.WEIGHT_MOMENT_BODY].sum())) < 1e-4 * weight
+    assert light.tube[core.TUBE_LOAD] == pytest.approx(none.tube[core.TUBE_LOAD], rel=1e-9)
+    assert none.tube[core.TUBE_LOAD] > 0.1 * weight
 
 
 def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
     """A step that is tried too far leaves no number behind with which the next one begins."""
     steady, links, _ = made()
     state, data = state_at_release(steady.robot, links, *at(gap=3e-4)), links.data
-    before, after, inside = np.empty((3, rigid_links.STATES))
+    before, after, inside = np.empty((3, core.STATE_SIZE))
     stand_in.steps.rates(before, 0.0, state, data, links.table)
     beyond = state.copy()
-    beyond[rigid_links.POSITION + 2] = np.nan
+    beyond[core.STATE_POSITION + 2] = np.nan
     stand_in.steps.rates(inside, 0.0, beyond, data, links.table)
     assert np.isnan(inside).any()
     stand_in.steps.rates(after, 0.0, state, data, links.table)

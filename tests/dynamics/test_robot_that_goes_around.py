@@ -9,7 +9,7 @@ import pytest
 
 from spirillum.dynamics.return_map import STEPS, Turn
 from spirillum.dynamics.steady_state_search import Path, _around
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.swimming.released_motion import State, SteadyState
 
 
@@ -32,13 +32,13 @@ def test_means_are_over_the_last_circuit() -> None:
     """Turns of 0.5 s, 1.75 s around: the circuit begins in the seventh of ten turns, whose start is where it does."""
     path, steps = Path(), 100
     place = {name: column for column, name in enumerate(STEPS)}
-    states = [np.zeros(rigid_links.STATES)]
+    states = [np.zeros(core.STATE_SIZE)]
     for number in range(10):
         rows = np.zeros((steps, len(STEPS)))
         rows[:, place["time"]] = np.linspace(0.5 / steps, 0.5, steps)
         raw = -2.0 * np.pi / 1.75 * (0.5 * number + rows[:, place["time"]])
         rows[:, place["azimuth"]] = (raw + np.pi) % (2.0 * np.pi) - np.pi
-        turn = Turn(np.full(rigid_links.STATES, number + 1.0), 0.5, rows, np.eye(8))
+        turn = Turn(np.full(core.STATE_SIZE, number + 1.0), 0.5, rows, np.eye(8))
         turn.state[:3] = 0.0
         path.add(turn)
         states.append(turn.state)

@@ -188,13 +188,13 @@ def test_film_is_lost_as_its_gradient_says() -> None:
     """By finite differences of place and attitude, for a tilted sphere-ended, an edged and an ellipsoidal ring."""
     from scipy.spatial.transform import Rotation
 
-    from spirillum.kernels import core, rigid_links
+    from spirillum.kernels import core
 
     wall = np.array([0.02, 1e-6, np.inf, 1.0])
     place, attitude = np.array([0.0, 2.1e-3, -8.5e-3]), Rotation.from_euler("xyz", [0.3, 0.1, -0.07])
 
     def film(step: np.ndarray, spot: np.ndarray, gradient: np.ndarray) -> float:
-        state = np.zeros(rigid_links.STATES)
+        state = np.zeros(core.STATE_SIZE)
         state[:3] = place + attitude.apply(step[:3])
         turned = attitude * Rotation.from_rotvec(step[3:])
         state[3:7] = turned.as_quat(scalar_first=True)

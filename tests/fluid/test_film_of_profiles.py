@@ -10,7 +10,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.fluid.tube.nodes import rings_of
-from spirillum.kernels import core, rigid_links
+from spirillum.kernels import core
 from spirillum.kernels.core import clearance, contact_offset, smallest_gap
 from spirillum.robot.outline import Outline, body_outline, profile_outline
 from spirillum.robot.tube_pose import TubePose
@@ -67,7 +67,7 @@ def test_gap_and_contact_are_those_of_the_outline(name: str, pitch: float, yaw: 
     allowed = 6e-4 * A
     pose = TubePose.at_gap(outline, TUBE, 1e-3, pitch, yaw=yaw)
     assert smallest_gap(head_of(body), pose.offset, pitch, yaw) == pytest.approx(1e-3, abs=allowed)
-    state, (along, up, right) = np.zeros(rigid_links.STATES), pose.rotation
+    state, (along, up, right) = np.zeros(core.STATE_SIZE), pose.rotation
     state[2] = -pose.offset
     flip = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # (x, up, right) to (x, left, up)
     rotation = np.ascontiguousarray(flip @ np.stack([along, up, right]) @ flip.T)

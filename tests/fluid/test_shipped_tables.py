@@ -20,8 +20,8 @@ from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.stokeslets import Accuracy
-from spirillum.kernels.core import largest_yaw, mean_resistance_at
-from spirillum.kernels.tube_table import INSIDE, MIRROR, PHASES, TOO_FAR_PITCHED, YAW_SLACK
+from spirillum.kernels.core import INSIDE, TOO_FAR_PITCHED, largest_yaw, mean_resistance_at
+from spirillum.kernels.tube_table import MIRROR, PHASES, YAW_SLACK
 from spirillum.papers.biorob2012.published import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.tube_pose import TubePose

@@ -16,7 +16,8 @@ from spirillum.fluid.tube.outer_resistance import NodeSolution
 from spirillum.fluid.tube.stages import FINE, RESPONSES, STAGES, STRAIGHT, YAW, response_errors
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import INSIDE, TOO_FAR_YAWED, parts_of
+from spirillum.kernels.core import INSIDE, TOO_FAR_YAWED
+from spirillum.kernels.tube_table import parts_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 

@@ -127,7 +127,7 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
         f = pitch / most
         phase = draw.uniform(0, 6)
         found, left = at(table, e, pitch, 0.0, phase)
-        assert left == kernel.INSIDE
+        assert left == core.INSIDE
         thin = np.zeros((6, 6))
         film_at(film, e, pitch, 0.0, thin)
         factor = lower(smooth(t, f, phases), phase)
@@ -164,12 +164,12 @@ def test_the_rest_goes_on_linearly_below_the_first_node(places: Places, film: np
 
 def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
     table = packed(places, film, smooth)
-    assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
+    assert at(table, 0.0, 0.5)[1] == core.TOO_FAR_PITCHED
     turned = packed(places, film, smooth, lambda t, f: np.zeros((kernel.YAW_ORDERS, 5, 36)))
     most = core.largest_yaw(turned, 0.0, 0.0)
     assert most == pytest.approx(places.largest_yaw(1.0, 0.0))
-    assert at(turned, 0.0, 0.0, 1.02 * kernel.YAW_SLACK * most)[1] == kernel.TOO_FAR_YAWED
-    assert at(turned, 0.0, 0.0, 0.98 * kernel.YAW_SLACK * most)[1] == kernel.INSIDE
+    assert at(turned, 0.0, 0.0, 1.02 * kernel.YAW_SLACK * most)[1] == core.TOO_FAR_YAWED
+    assert at(turned, 0.0, 0.0, 0.98 * kernel.YAW_SLACK * most)[1] == core.INSIDE
 
 
 def test_yaw_enters_as_powers_of_the_stretched_one(places: Places, film: np.ndarray) -> None:

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from spirillum.kernels import core, rigid_links
+from spirillum.kernels import core
 
 TUBE, WIRE, AMPLITUDE, WAVELENGTH, OIL = 20e-3, 0.5e-3, 2.5e-3, 25e-3, 3.5
 RATE, JOINT = 2.0 * np.pi * 1.5, 6
@@ -34,7 +34,7 @@ def film(gap: float, bound: float, *, at: float = 30e-3, is_line: bool = False) 
     slope = [zero - 1.0, K * AMPLITUDE * np.sin(angle), -K * AMPLITUDE * np.cos(angle)]
     stations = np.column_stack([xi, *point, *slope, zero])
     wire = np.array([WIRE, AMPLITUDE, 0.0, 0.0 if is_line else K, 0.0, 60e-3])
-    state, rates, force = np.zeros(rigid_links.STATES), np.zeros(7), np.empty(7)
+    state, rates, force = np.zeros(core.STATE_SIZE), np.zeros(7), np.empty(7)
     state[:3] = 0.0, 0.0, -(TUBE - WIRE - AMPLITUDE - gap)
     state[3], rates[JOINT] = 1.0, RATE
     state[7] = -0.5 * np.pi + K * at

@@ -9,13 +9,13 @@ import spirillum as sp
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import core, rigid_links, stiff_steps, tube_motion, two_links
+from spirillum.kernels import core, tube_motion, two_links
 from spirillum.kernels.core import resistance_at
 from spirillum.robot.batch import RobotBatch
 
 RADIUS, VISCOSITY, MU, SLOW = 0.02, 0.9, 0.2, 1e-5
 DRIVES = [(kind, fixed) for kind in (0.0, 1.0, 2.0, 3.0) for fixed in (0.0, 1.0) if (kind, fixed) != (0.0, 1.0)]
-CURRENT, JOINT_AXIS, ROBOT_AXIS = rigid_links.CURRENT, np.eye(7)[6], np.eye(7)[3]
+CURRENT, JOINT_AXIS, ROBOT_AXIS = core.STATE_CURRENT, np.eye(7)[6], np.eye(7)[3]
 
 
 class Case:
@@ -23,18 +23,18 @@ class Case:
 
     def __init__(self, kind: float, fixed: float, gap: float, seed: int = 1) -> None:
         rng = np.random.default_rng(seed)
-        self.drive = np.zeros(rigid_links.DRIVE)
-        self.drive[rigid_links.DUTY :] = rng.uniform(0.5, 1.5, rigid_links.DRIVE - rigid_links.DUTY)
-        self.drive[[rigid_links.KIND, rigid_links.FIXED, rigid_links.AXIS_Y, rigid_links.AXIS_Z]] = kind, fixed, 0, 0
-        self.drive[rigid_links.GIVEN] = 1e-3 if kind == rigid_links.TORQUE else 0.02
-        self.drive[rigid_links.TORQUE_CONSTANT] = 1e-3
+        self.drive = np.zeros(core.DRIVE_SIZE)
+        self.drive[core.DRIVE_DUTY :] = rng.uniform(0.5, 1.5, core.DRIVE_SIZE - core.DRIVE_DUTY)
+        self.drive[[core.DRIVE_KIND, core.DRIVE_FIXED, core.DRIVE_AXIS_Y, core.DRIVE_AXIS_Z]] = kind, fixed, 0, 0
+        self.drive[core.DRIVE_GIVEN] = 1e-3 if kind == core.TORQUE else 0.02
+        self.drive[core.DRIVE_TORQUE_CONSTANT] = 1e-3
         size = np.array([1.0, 1.0, 1.0, 0.01, 0.01, 0.01, 0.01])
         half = rng.normal(size=(7, 7))
         self.drag = np.outer(size, size) * (half @ half.T + np.eye(7))
         self.friction = np.zeros((7, 7))
         self.friction[np.ix_([3, 6], [3, 6])] = 1e-4 * np.array([[1.0, 0.2], [0.3, 1.0]])
-        self.weight = rng.uniform(0.5, 1.0, rigid_links.WEIGHT) * np.array([0.1, 0.1] + 6 * [1e-4])
-        self.state = rng.normal(size=rigid_links.STATES)
+        self.weight = rng.uniform(0.5, 1.0, core.WEIGHT_SIZE) * np.array([0.1, 0.1] + 6 * [1e-4])
+        self.state = rng.normal(size=core.STATE_SIZE)
         turned = Rotation.from_euler("xyz", [0.4, -0.01, 0.02])
         self.state[3:7] = 1.01 * turned.as_quat(scalar_first=True)
         self.state[1:3] = (RADIUS - 0.009 - gap) * np.array([np.sin(0.3), -np.cos(0.3)])
@@ -43,7 +43,7 @@ class Case:
     @property
     def along(self) -> np.ndarray:
         """What the drive's torque acts on."""
-        return ROBOT_AXIS if self.drive[rigid_links.FIXED] else JOINT_AXIS
+        return ROBOT_AXIS if self.drive[core.DRIVE_FIXED] else JOINT_AXIS
 
     def loads(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Weight, and the field on the magnetic moment."""
@@ -53,10 +53,10 @@ class Case:
             [self.weight[:2].sum() * down, np.cross(place[0] + rotor, down), np.cross(rotor, down)[:1]]
         )
         field = np.zeros(7)
-        if self.drive[rigid_links.KIND] == rigid_links.MAGNETIC:
-            angle = self.drive[rigid_links.FIELD_RATE] * time + self.drive[rigid_links.FIELD_PHASE]
-            strength = self.drive[rigid_links.FIELD] * np.array([0.0, -np.sin(angle), np.cos(angle)])
-            field[3:6] = np.cross(self.drive[rigid_links.MOMENT : rigid_links.MOMENT + 3], self.axes.T @ strength)
+        if self.drive[core.DRIVE_KIND] == core.MAGNETIC:
+            angle = self.drive[core.DRIVE_FIELD_RATE] * time + self.drive[core.DRIVE_FIELD_PHASE]
+            strength = self.drive[core.DRIVE_FIELD] * np.array([0.0, -np.sin(angle), np.cos(angle)])
+            field[3:6] = np.cross(self.drive[core.DRIVE_MOMENT : core.DRIVE_MOMENT + 3], self.axes.T @ strength)
         return weight, field
 
 
@@ -71,26 +71,26 @@ def about_x(phase: float) -> np.ndarray:
 def check_motion(case: Case, seen: np.ndarray, dy: np.ndarray) -> None:
     """The drive, and the derivative of the state from the rates."""
     drive, q, current = case.drive, seen[:7], case.state[CURRENT]
-    torque, kind = seen[rigid_links.DRIVE_TORQUE], drive[rigid_links.KIND]
-    if kind == rigid_links.RATE:
-        assert q[3] + q[6] == pytest.approx(drive[rigid_links.GIVEN], rel=1e-9)
+    torque, kind = seen[core.SEEN_DRIVE_TORQUE], drive[core.DRIVE_KIND]
+    if kind == core.RATE:
+        assert q[3] + q[6] == pytest.approx(drive[core.DRIVE_GIVEN], rel=1e-9)
     else:
-        motor = drive[rigid_links.POLARITY] * drive[rigid_links.TORQUE_CONSTANT] * current
-        assert torque == {0.0: motor, 1.0: drive[rigid_links.DUTY] * drive[rigid_links.GIVEN], 3.0: 0.0}[kind]
+        motor = drive[core.DRIVE_POLARITY] * drive[core.DRIVE_TORQUE_CONSTANT] * current
+        assert torque == {0.0: motor, 1.0: drive[core.DRIVE_DUTY] * drive[core.DRIVE_GIVEN], 3.0: 0.0}[kind]
     assert dy[:3] == pytest.approx(case.axes @ q[:3], rel=1e-12)
     step = 1e-6
     later = Rotation.from_matrix(case.axes) * Rotation.from_rotvec(step * q[3:6])
     moved = Rotation.from_quat(case.state[3:7] + step * dy[3:7], scalar_first=True)
     assert (later.inv() * moved).magnitude() == pytest.approx(0.0, abs=step**2 * (1.0 + q[3:6] @ q[3:6]))
     assert dy[[7, 8]] == pytest.approx(q[[6, 3]])
-    constant, decay, fall, growth, rise, slope = drive[rigid_links.CONSTANT : rigid_links.SLOPE + 1]
+    constant, decay, fall, growth, rise, slope = drive[core.DRIVE_CONSTANT : core.DRIVE_SLOPE + 1]
     resistance = constant + decay * np.exp(-fall * abs(current)) + growth * np.exp(rise * abs(current))
     resistance += slope * abs(current)
-    sag = drive[rigid_links.INTERNAL_RESISTANCE] * abs(current)
-    supply = drive[rigid_links.DUTY] * (drive[rigid_links.VOLTAGE] - sag)
-    emf = drive[rigid_links.BACK_EMF] * drive[rigid_links.POLARITY] * q[6]
-    change = (supply - resistance * current - emf) / drive[rigid_links.INDUCTANCE]
-    assert dy[CURRENT] == pytest.approx(change if kind == rigid_links.MOTOR else 0.0, rel=1e-12)
+    sag = drive[core.DRIVE_INTERNAL_RESISTANCE] * abs(current)
+    supply = drive[core.DRIVE_DUTY] * (drive[core.DRIVE_VOLTAGE] - sag)
+    emf = drive[core.DRIVE_BACK_EMF] * drive[core.DRIVE_POLARITY] * q[6]
+    change = (supply - resistance * current - emf) / drive[core.DRIVE_INDUCTANCE]
+    assert dy[CURRENT] == pytest.approx(change if kind == core.MOTOR else 0.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(("kind", "fixed"), DRIVES)
@@ -107,13 +107,13 @@ def test_rates_without_a_tube(kind: float, fixed: float, gap: float) -> None:
     turn = about_x(case.state[7])[:7, :7]
     a, (weight, field) = turn @ case.drag @ turn.T + case.friction, case.loads(0.7)
     film = core.film_of(case.state, case.axes, wall, ring[0], j)
-    assert (thinnest[0], data[rigid_links.FILM]) == (pytest.approx(film, rel=1e-9), pytest.approx(film, rel=1e-9))
+    assert (thinnest[0], data[core.SEEN_FILM]) == (pytest.approx(film, rel=1e-9), pytest.approx(film, rel=1e-9))
     h = max(film, 1e-9 * rough)
     if h < ring[0, 5]:
         a[:6, :6] += min(0.3 * ((ring[0, 5] / h) ** 1.5 - 1.0), 1e3) * np.outer(j, j)
     if h < rough:
         weight[:6] -= load * (rough / h - 1.0) * j
-    force = weight + field + data[rigid_links.DRIVE_TORQUE] * case.along
+    force = weight + field + data[core.SEEN_DRIVE_TORQUE] * case.along
     free = slice(0, 6 if fixed else 7)
     q = np.zeros(7)
     q[free] = np.linalg.solve(a[free, free], force[free])
@@ -144,7 +144,7 @@ def fluid_at(table: np.ndarray, case: Case) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("kind", "fixed"), DRIVES)
-@pytest.mark.parametrize("ends", [tube_motion.CLOSED, tube_motion.OPEN, tube_motion.IMPOSED])
+@pytest.mark.parametrize("ends", [core.CLOSED, core.OPEN, core.IMPOSED])
 @pytest.mark.parametrize("gap", [2e-3, 6e-5])
 def test_rates_in_a_tube(table: np.ndarray, kind: float, fixed: float, ends: float, gap: float) -> None:
     """The rates leave nothing of the forces as NumPy assembles them, contact and dry friction included."""
@@ -158,12 +158,12 @@ def test_rates_in_a_tube(table: np.ndarray, kind: float, fixed: float, ends: flo
     core.gaps_of(case.state, data, table, gaps)
     q, m = data[:7], fluid_at(table, case)
     weight, field = case.loads(0.7)
-    mean_flow = 1e-3 + 0.4 * 2e-3 if ends == tube_motion.IMPOSED else 0.0
-    if ends == tube_motion.OPEN:
+    mean_flow = 1e-3 + 0.4 * 2e-3 if ends == core.IMPOSED else 0.0
+    if ends == core.OPEN:
         mean_flow = m[7, :7] @ q / (8.0 * np.pi * 0.5 * VISCOSITY + m[7, 7])
-    assert data[tube_motion.MEAN_FLOW] == pytest.approx(mean_flow, rel=1e-9)
+    assert data[core.SEEN_MEAN_FLOW] == pytest.approx(mean_flow, rel=1e-9)
     against = m[:7, :7] @ q - m[:7, 7] * mean_flow
-    left = weight + field + data[rigid_links.DRIVE_TORQUE] * case.along - against - case.friction @ q
+    left = weight + field + data[core.SEEN_DRIVE_TORQUE] * case.along - against - case.friction @ q
     lost = normal_force = 0.0
     for site, found in zip(sites, gaps, strict=False):
         normal, point, j, rows = np.empty(3), np.empty(3), np.empty(7), np.empty((2, 7))
@@ -183,7 +183,7 @@ def test_rates_in_a_tube(table: np.ndarray, kind: float, fixed: float, ends: flo
     scale = np.abs(weight) + np.abs(against) + np.abs(case.friction @ q) + normal_force * np.array([1] * 3 + [0.01] * 4)
     assert left == pytest.approx(np.zeros(7), abs=1e-9 * scale.max())
     assert (normal_force > 0.0) == (gap < rough)
-    assert data[[tube_motion.CONTACT_FORCE, tube_motion.CONTACT_POWER]] == pytest.approx([normal_force, lost], rel=1e-9)
+    assert data[[core.SEEN_CONTACT_FORCE, core.SEEN_CONTACT_POWER]] == pytest.approx([normal_force, lost], rel=1e-9)
     check_motion(case, data, dy)
 
 
@@ -191,8 +191,8 @@ def test_steps_are_those_of_another_method() -> None:
     """A robot that a field turns, by an explicit method of order 8."""
     case, none = Case(3.0, 1.0, 1e-3), np.zeros(0)
     case.weight *= 1e-3
-    case.drive[rigid_links.FIELD_RATE] = 3.0
-    case.drive[rigid_links.MOMENT : rigid_links.MOMENT + 3] *= 1e-3
+    case.drive[core.DRIVE_FIELD_RATE] = 3.0
+    case.drive[core.DRIVE_MOMENT : core.DRIVE_MOMENT + 3] *= 1e-3
     data = two_links.packed(case.drag, case.friction, case.weight, np.full(4, np.inf), np.zeros((0, 6)), case.drive)
     y, dy = case.state.copy(), np.empty(19)
     y[3:7] /= np.linalg.norm(y[3:7])
@@ -203,14 +203,14 @@ def test_steps_are_those_of_another_method() -> None:
 
     times = np.linspace(0.0, 2.0, 9)[1:]
     expected = solve_ivp(rates, (0.0, 2.0), y, method="DOP853", t_eval=times, rtol=1e-11, atol=1e-13).y.T
-    memory, found = np.zeros(stiff_steps.MEMORY), np.empty((8, 19))
-    memory[stiff_steps.STEP] = 1e-4
+    memory, found = np.zeros(core.MEMORY_SIZE), np.empty((8, 19))
+    memory[core.MEMORY_STEP] = 1e-4
     sizes, limits = np.append(np.ones(19), [1e-6, 1.0]), np.array([np.inf, 0.0, 0.0, 0.0, np.inf])
     sizes[:3] = 0.01
     end = core.advance(
         2.0, True, 100_000, 1e-9, memory, y, y.copy(), np.zeros((8, 19)), np.zeros((8, 8)), np.ones(4), times,
         found, sizes, limits, 0.0, data, none,
     )  # fmt: skip
-    assert (end, memory[stiff_steps.ANSWERED], memory[stiff_steps.TIME]) == (stiff_steps.DONE, 8.0, 2.0)
+    assert (end, memory[core.MEMORY_ANSWERED], memory[core.MEMORY_TIME]) == (core.DONE, 8.0, 2.0)
     assert found == pytest.approx(expected, abs=1e-6)
     assert np.abs(expected[-1, 3:7] - case.state[3:7]).max() > 0.1

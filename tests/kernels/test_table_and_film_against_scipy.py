@@ -73,7 +73,7 @@ def test_the_table_is_film_and_outer_part_as_scipy_interpolates_them(
     expected = outer_of(table, t, f, phase)
     expected[:6, :6] += core.cut_of_film(t) * film_of(tube_table.parts_of(table).film, e, pitch, 0.0)
     found = np.empty((8, 8))
-    assert core.resistance_at(table, e, pitch, 0.0, phase, found) == tube_table.INSIDE
+    assert core.resistance_at(table, e, pitch, 0.0, phase, found) == core.INSIDE
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11 * np.abs(expected).max())
 
 

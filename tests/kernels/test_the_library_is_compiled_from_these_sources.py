@@ -16,7 +16,7 @@ import pytest
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import core, native, rigid_links, two_links
+from spirillum.kernels import core, native, two_links
 from spirillum.kernels.core import contact_offset, film_coordinates, spline_weights
 
 BUILD = Path(__file__).parents[2] / "csrc" / "build.py"
@@ -52,16 +52,16 @@ def test_every_build_finds_the_same_numbers(strict: Path, wide: Any, monkeypatch
     rng = np.random.default_rng(1)
     poses = [(*rng.uniform([2e-3, -0.05, -0.03], [6e-3, 0.05, 0.03]), phase) for phase in range(10)]
     half, other = rng.normal(size=(7, 7)), rng.uniform(size=(7, 7))
-    drive = np.append(np.zeros(rigid_links.DUTY), rng.uniform(0.5, 1.5, rigid_links.DRIVE - rigid_links.DUTY))
-    links = (half @ half.T + np.eye(7), 1e-4 * other, rng.uniform(size=rigid_links.WEIGHT), np.full(4, np.inf))
-    states = rng.normal(size=(10, rigid_links.STATES))
+    drive = np.append(np.zeros(core.DRIVE_DUTY), rng.uniform(0.5, 1.5, core.DRIVE_SIZE - core.DRIVE_DUTY))
+    links = (half @ half.T + np.eye(7), 1e-4 * other, rng.uniform(size=core.WEIGHT_SIZE), np.full(4, np.inf))
+    states = rng.normal(size=(10, core.STATE_SIZE))
     found = []
     for path in (native.library()._name, str(strict)):
         monkeypatch.setattr(native, "library", partial(ctypes.CDLL, path))
         stubs = runpy.run_path(core.__file__)
         numbers = []
         for pose, state in zip(poses, states, strict=True):
-            matrix, change = np.empty((8, 8)), np.empty(rigid_links.STATES)
+            matrix, change = np.empty((8, 8)), np.empty(core.STATE_SIZE)
             stubs["resistance_at"](packed, *pose, matrix)
             data = two_links.packed(*links, np.zeros((0, 6)), drive)
             stubs["rates"](change, 0.7, state, data, np.zeros(0))

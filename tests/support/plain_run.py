@@ -20,7 +20,7 @@ from spirillum.dynamics.free_robot import drive_of, weight_of
 from spirillum.dynamics.run_file import robot_of
 from spirillum.fluid.tube.library import tables_of
 from spirillum.fluid.tube.tube import END_LOSS
-from spirillum.kernels import rigid_links as links
+from spirillum.kernels import core
 from spirillum.kernels.core import film_at, resistance_at
 from spirillum.kernels.tube_table import film_start
 from spirillum.robot.batch import RobotBatch
@@ -71,7 +71,9 @@ class PlainRun:
         self.rough, self.slow = (float(self.run.attrs[name]) for name in ("roughness", "sliding_speed"))
         self.slipping = float(self.run.attrs["friction_coefficient"])
         # Asperities carry W at half their height: the larger of weight and stall torque over the half-length.
-        stall = self.drive[links.TORQUE_CONSTANT] * self.drive[links.VOLTAGE] / self.drive[links.CONSTANT]
+        stall = (
+            self.drive[core.DRIVE_TORQUE_CONSTANT] * self.drive[core.DRIVE_VOLTAGE] / self.drive[core.DRIVE_CONSTANT]
+        )
         self.load = max(np.abs(self.weight[:2]).sum(), stall / self.half)
         self.q, self.active = np.zeros(7), None
         self.correction = np.zeros((6, 6))
@@ -161,7 +163,7 @@ class PlainRun:
         force = np.concatenate(
             [self.weight[:2].sum() * down, np.cross(moments[0] + rotor, down), np.cross(rotor, down)[:1]]
         )
-        force[6] += self.drive[links.POLARITY] * self.drive[links.TORQUE_CONSTANT] * state[7]
+        force[6] += self.drive[core.DRIVE_POLARITY] * self.drive[core.DRIVE_TORQUE_CONSTANT] * state[7]
         contacts = self._contacts(state, axes)
         for load, closing, _ in contacts:
             force = force - load * closing
@@ -201,12 +203,12 @@ class PlainRun:
         moved, (w, x, y, z) = axes @ q[:3], state[2:6]
         turning = 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]) @ q[3:6]
         drive, current = self.drive, float(state[7])
-        supply = drive[links.VOLTAGE] - drive[links.INTERNAL_RESISTANCE] * abs(current)
-        constant, decay, fall, growth, rise, slope = drive[links.CONSTANT : links.SLOPE + 1]
+        supply = drive[core.DRIVE_VOLTAGE] - drive[core.DRIVE_INTERNAL_RESISTANCE] * abs(current)
+        constant, decay, fall, growth, rise, slope = drive[core.DRIVE_CONSTANT : core.DRIVE_SLOPE + 1]
         resistance = constant + decay * np.exp(-fall * abs(current)) + growth * np.exp(rise * abs(current))
         resistance += slope * abs(current)
-        emf = drive[links.BACK_EMF] * drive[links.POLARITY] * q[6]
-        change = (supply - resistance * current - emf) / drive[links.INDUCTANCE]
+        emf = drive[core.DRIVE_BACK_EMF] * drive[core.DRIVE_POLARITY] * q[6]
+        change = (supply - resistance * current - emf) / drive[core.DRIVE_INDUCTANCE]
         return np.concatenate([moved[1:], turning, [q[6], change, moved[0], q[3]]])
 
     def _slopes(self, time: float, state: np.ndarray) -> np.ndarray:

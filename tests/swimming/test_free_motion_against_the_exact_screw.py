@@ -11,7 +11,7 @@ from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.timing import Switch
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.swimming.released_motion import LINKS
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
@@ -88,13 +88,13 @@ def test_lateral_freedom_costs_a_little_speed() -> None:
 def test_reversed_tail_retraces_the_path() -> None:
     links = links_of(robot())
     drive = links.drive.copy()
-    drive[rigid_links.KIND], drive[rigid_links.GIVEN] = rigid_links.RATE, 8.0
+    drive[core.DRIVE_KIND], drive[core.DRIVE_GIVEN] = core.RATE, 8.0
     there = replace(links, drive=drive)
     drive = drive.copy()
-    drive[rigid_links.GIVEN] = -8.0
+    drive[core.DRIVE_GIVEN] = -8.0
     back = replace(links, drive=drive)
-    start = np.zeros(rigid_links.STATES)
-    start[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = (0.8, 0.3, -0.1, np.sqrt(1 - 0.74))
+    start = np.zeros(core.STATE_SIZE)
+    start[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4] = (0.8, 0.3, -0.1, np.sqrt(1 - 0.74))
     time = np.linspace(0.0, 40.0, 801)
     forward = integrate(there, start, time, [Switch(0.0, 1.0)], NOWHERE)
     turned = forward.states[-1].copy()
@@ -109,7 +109,7 @@ def test_unbounded_fluid_has_no_direction() -> None:
 
     links = links_of(robot())
     time = np.linspace(0.0, 3.0, 61)
-    level, turned = np.zeros(rigid_links.STATES), np.zeros(rigid_links.STATES)
+    level, turned = np.zeros(core.STATE_SIZE), np.zeros(core.STATE_SIZE)
     attitude = Rotation.from_euler("xyz", [0.4, -1.1, 2.0])
     level[3] = 1.0
     turned[3:7] = attitude.as_quat(scalar_first=True)

@@ -289,10 +289,10 @@ def test_run_in_time_refuses_a_flow(walled: SwimmerModel) -> None:
     import spirillum as sp
     from spirillum.dynamics.axial_robot import AxialRobot, axial_run
     from spirillum.dynamics.timing import Timing
-    from spirillum.kernels.motor import SPEED
+    from spirillum.kernels.core import AXIAL_SPEED
 
     prediction = sp.predict("biorob2012-wide", model="walled", placement={"flow": "1 mm/s"})
     with pytest.raises(InputError, match=r"placement\.flow = 1 mm/s: a run in time starts from rest; allowed: no flow"):
         axial_run(prediction, Timing())
     still = sp.predict("biorob2012-wide", model="walled", placement={"gap": "1 mm"})
-    assert AxialRobot.of(still).numbers[SPEED] > 0
+    assert AxialRobot.of(still).numbers[AXIAL_SPEED] > 0

@@ -14,7 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.axial_robot import PARAMETERS, STATES, AxialRobot, axial_robot, motion, responses
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
-from spirillum.kernels import motor as kernel
+from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.robot.batch import batches
 from spirillum.robot.fields import kind_of
@@ -173,7 +173,7 @@ class AxialBatch:
         self._rng = np.random.default_rng(seed)
         self.time: Samples = np.zeros(count)
         """Time since each was reset, s."""
-        self.states: Samples = np.zeros((count, kernel.STATES))
+        self.states: Samples = np.zeros((count, core.AXIAL_STATE_SIZE))
         """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7).
 
         Of a motor with a curve the torque, N m, replaces the current."""
@@ -273,16 +273,18 @@ class AxialBatch:
         """True values by name: the states, rates and speed."""
         found = {name: self.states[:, STATES.index(name)].copy() for name in self.axial.states}
         found |= self._rates(self.states, self._flow)
-        current = self.states[:, kernel.CURRENT]
+        current = self.states[:, core.AXIAL_STATE_CURRENT]
         if self.axial.curve is not None:
             return found | {"drive_torque": current.copy()}
-        voltage = self.numbers[:, kernel.VOLTAGE] - self.numbers[:, kernel.INTERNAL] * np.abs(current)
+        voltage = self.numbers[:, core.AXIAL_VOLTAGE] - self.numbers[:, core.AXIAL_INTERNAL_RESISTANCE] * np.abs(
+            current
+        )
         return found | {"battery_voltage": voltage}
 
     def _rates(self, states: Samples, flow: Samples) -> dict[str, Samples]:
         """Speed and rates in some states, by name."""
         names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
-        return dict(zip(names, motion(self.numbers, states[:, kernel.CURRENT], flow), strict=True))
+        return dict(zip(names, motion(self.numbers, states[:, core.AXIAL_STATE_CURRENT], flow), strict=True))
 
     def _check_stokes(self, rates: Mapping[str, Samples], flow: Samples) -> None:
         """Add what the robots break of Stokes flow to the warnings, once for each limit."""

@@ -33,9 +33,7 @@ from spirillum.dynamics.timing import Switch, Timing
 from spirillum.errors import InputError
 from spirillum.fitted.fit import read_fit
 from spirillum.kernels import core
-from spirillum.kernels import motor as kernel
-from spirillum.kernels.core import steady_currents, windings
-from spirillum.kernels.motor import MOTOR
+from spirillum.kernels.core import MOTOR_SIZE, steady_currents, windings
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
@@ -109,8 +107,12 @@ class AxialRobot:
         """The robot of a prediction, in axial motion."""
         batch, motor = steady.batch, steady.batch.electrics
         if batch.curve is not None:
-            own = np.zeros(kernel.SPEED)
-            own[[kernel.TORQUE, kernel.INDUCTANCE, kernel.POLARITY]] = 1.0, 1.0, batch.curve.sense * batch.hand[0]
+            own = np.zeros(core.AXIAL_SPEED)
+            own[[core.AXIAL_TORQUE_CONSTANT, core.AXIAL_INDUCTANCE, core.AXIAL_POLARITY]] = (
+                1.0,
+                1.0,
+                batch.curve.sense * batch.hand[0],
+            )
         elif batch.drive == "dc-motor" and motor is not None:
             own = np.array([column[0] for column in motor.columns])
         else:
@@ -148,7 +150,7 @@ class AxialRobot:
     @property
     def parameters(self) -> dict[AxialParameter, float]:
         """The numbers that its equations have."""
-        first = 0 if self.curve is None else kernel.POLARITY
+        first = 0 if self.curve is None else core.AXIAL_POLARITY
         return dict(list(zip(PARAMETERS, self.values, strict=True))[first:])
 
     @property
@@ -167,7 +169,7 @@ class AxialRobot:
     def advance(
         self, numbers: Samples, states: Samples, dt: float, duty: Samples, flow: Samples, fineness: float = 1.0
     ) -> None:
-        """Take robots with its motor over a time; arguments as of `kernels.motor.advance`."""
+        """Take robots with its motor over a time; arguments as of `core.advance_axial`."""
         if self.curve is None:
             core.advance_axial(numbers, states, dt, duty, flow, fineness)
         else:
@@ -177,9 +179,9 @@ class AxialRobot:
         """Current at which it no longer changes, A; the torque of a motor with a curve, N m."""
         if self.curve is None:
             return steady_current(numbers, duty, flow)
-        found = np.zeros((1, kernel.STATES))
+        found = np.zeros((1, core.AXIAL_STATE_SIZE))
         self.advance(numbers[None], found, 0.0, np.array([duty]), np.array([flow]))
-        return float(found[0, kernel.CURRENT])
+        return float(found[0, core.AXIAL_STATE_CURRENT])
 
     def check_steady(self, duty: float, flow: float) -> list[Note]:
         """Refuse a robot far outside Stokes flow at a steady duty and flow; return a note for each exceeded limit."""
@@ -233,36 +235,44 @@ def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscos
 
 def motion(p: Samples, current: Any, flow: Any) -> Samples:
     """U, omega and Omega, (3, ...), of robots with numbers `p` (..., 18), a current, A, and an imposed flow, m/s."""
-    torque = p[..., kernel.TORQUE] * current
-    pairs = ((kernel.SPEED, kernel.SPEED_FLOW), (kernel.TAIL, kernel.TAIL_FLOW), (kernel.BODY, kernel.BODY_FLOW))
+    torque = p[..., core.AXIAL_TORQUE_CONSTANT] * current
+    pairs = (
+        (core.AXIAL_SPEED, core.AXIAL_SPEED_FLOW),
+        (core.AXIAL_TAIL, core.AXIAL_TAIL_FLOW),
+        (core.AXIAL_BODY, core.AXIAL_BODY_FLOW),
+    )
     return np.stack([p[..., per_torque] * torque + p[..., per_flow] * flow for per_torque, per_flow in pairs])
 
 
 def outputs(p: Samples, states: Samples, duty: Any, flow: Any) -> Samples:
     """All of `OUTPUTS`, (12, ...), of robots with numbers `p` (..., 18) in states (5 or more, ...)."""
-    current = states[kernel.CURRENT]
+    current = states[core.AXIAL_STATE_CURRENT]
     speed, tail, body = motion(p, current, flow)
-    voltage = p[..., kernel.VOLTAGE] - p[..., kernel.INTERNAL] * np.abs(current)
-    power = p[..., kernel.POLARITY] * duty * voltage * current
-    torque = p[..., kernel.TORQUE] * current
+    voltage = p[..., core.AXIAL_VOLTAGE] - p[..., core.AXIAL_INTERNAL_RESISTANCE] * np.abs(current)
+    power = p[..., core.AXIAL_POLARITY] * duty * voltage * current
+    torque = p[..., core.AXIAL_TORQUE_CONSTANT] * current
     return np.stack([*states[1:5], speed, tail, body, tail - body, current, torque, voltage, power])
 
 
 def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
     """d/dt of the state and its two integrals, (7,), by the robot's numbers, current, duty and imposed mean flow."""
-    found = np.empty(kernel.STATES)
+    found = np.empty(core.AXIAL_STATE_SIZE)
     core.axial_rates(p, current, duty, flow, found)
     return found
 
 
 def slopes(p: Samples, current: float, duty: float) -> tuple[Samples, Samples, Samples, Samples]:
     """A (5, 5), B (5, 2), C (12, 5), D (12, 2) of the equations linearised at a current and duty, in closed form."""
-    size, sense, sign = abs(current), math.copysign(1.0, current), p[kernel.POLARITY]
+    size, sense, sign = abs(current), math.copysign(1.0, current), p[core.AXIAL_POLARITY]
     found = np.empty((1, 2))
-    windings(p[None, :MOTOR], np.array([current]), found)
+    windings(p[None, :MOTOR_SIZE], np.array([current]), found)
     r, r_slope = found[0]
-    emf, inductance, internal = p[kernel.EMF], p[kernel.INDUCTANCE], p[kernel.INTERNAL]
-    voltage = p[kernel.VOLTAGE] - internal * size
+    emf, inductance, internal = (
+        p[core.AXIAL_BACK_EMF],
+        p[core.AXIAL_INDUCTANCE],
+        p[core.AXIAL_INTERNAL_RESISTANCE],
+    )
+    voltage = p[core.AXIAL_VOLTAGE] - internal * size
     per_current, per_flow = motion(p, 1.0, 0.0), motion(p, 0.0, 1.0)
     a, b, c, d = np.zeros((5, 5)), np.zeros((5, 2)), np.zeros((12, 5)), np.zeros((12, 2))
     a[0, 0] = -(sign * duty * internal * sense + r + r_slope * size + emf * (per_current[1] - per_current[2]))
@@ -272,7 +282,7 @@ def slopes(p: Samples, current: float, duty: float) -> tuple[Samples, Samples, S
     b[1:4, 1], b[4, 0] = per_flow, sign * current
     c[:4, 1:] = np.eye(4)
     electrical = [-internal * sense, sign * duty * (voltage - internal * size)]
-    c[4:, 0] = [*per_current, per_current[1] - per_current[2], 1.0, p[kernel.TORQUE], *electrical]
+    c[4:, 0] = [*per_current, per_current[1] - per_current[2], 1.0, p[core.AXIAL_TORQUE_CONSTANT], *electrical]
     d[4:8, 1] = [*per_flow, per_flow[1] - per_flow[2]]
     d[11, 0] = sign * voltage * current
     return a, b, c, d
@@ -280,10 +290,10 @@ def slopes(p: Samples, current: float, duty: float) -> tuple[Samples, Samples, S
 
 def steady_current(p: Samples, duty: float, flow: float) -> float:
     """The current at which it no longer changes, A."""
-    sense, found = p[kernel.POLARITY], np.empty(1)
-    back_emf = sense * p[kernel.EMF] * (p[kernel.TAIL_FLOW] - p[kernel.BODY_FLOW]) * flow
-    per_current = p[kernel.EMF] * (p[kernel.TAIL] - p[kernel.BODY]) * p[kernel.TORQUE]
-    steady_currents(np.array([[*p[:MOTOR], duty, back_emf, per_current]]), found)
+    sense, found = p[core.AXIAL_POLARITY], np.empty(1)
+    back_emf = sense * p[core.AXIAL_BACK_EMF] * (p[core.AXIAL_TAIL_FLOW] - p[core.AXIAL_BODY_FLOW]) * flow
+    per_current = p[core.AXIAL_BACK_EMF] * (p[core.AXIAL_TAIL] - p[core.AXIAL_BODY]) * p[core.AXIAL_TORQUE_CONSTANT]
+    steady_currents(np.array([[*p[:MOTOR_SIZE], duty, back_emf, per_current]]), found)
     return float(sense * found[0])
 
 
@@ -304,9 +314,9 @@ class AxialIntegrator(NamedTuple):
 def _advanced(robot: AxialRobot, time: Samples, duty: Samples) -> Samples:
     """States at times, (n, 7): a batch of one, from sample to sample."""
     numbers, still = robot.numbers[None], np.zeros(1)
-    states = np.zeros((time.size, kernel.STATES))
+    states = np.zeros((time.size, core.AXIAL_STATE_SIZE))
     if robot.curve is not None:  # its torque is there at once
-        states[:1, kernel.CURRENT] = robot.steady_current(robot.numbers, float(duty[0]), 0.0)
+        states[:1, core.AXIAL_STATE_CURRENT] = robot.steady_current(robot.numbers, float(duty[0]), 0.0)
     for n in range(1, time.size):
         states[n] = states[n - 1]
         robot.advance(numbers, states[n : n + 1], time[n] - time[n - 1], duty[n : n + 1], still, _FINENESS)
@@ -355,7 +365,7 @@ def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -
     series |= {"duty": duty, **_electrics(motor, p, duty, states)}
     # Without inertia torques are in proportion to the current, and powers to its square.
     whole = steady.motor_current if robot.curve is None else steady.drive_torque
-    share, square = states[:, kernel.CURRENT] / whole, states[:, kernel.SQUARE] / whole**2
+    share, square = states[:, core.AXIAL_STATE_CURRENT] / whole, states[:, core.AXIAL_STATE_SQUARED_CURRENT] / whole**2
     series |= {
         "tail_torque": steady.tail_torque * np.abs(share),
         "shaft_power": steady.shaft_power * share**2,
@@ -386,14 +396,22 @@ def _electrics(motor: Electrics | None, p: Samples, duty: Samples, states: Sampl
     """Resistance and energies of a DC-motor, from the battery to the winding, by name."""
     if motor is None:
         return {}
-    current, square, slip = states[:, kernel.CURRENT], states[:, kernel.SQUARE], p[kernel.TAIL] - p[kernel.BODY]
+    current, square, slip = (
+        states[:, core.AXIAL_STATE_CURRENT],
+        states[:, core.AXIAL_STATE_SQUARED_CURRENT],
+        p[core.AXIAL_TAIL] - p[core.AXIAL_BODY],
+    )
     drawn = np.cumsum(duty * np.diff(square, prepend=0.0))  # the current drives in its own sense throughout
     return {
         "motor_resistance": winding_resistance(motor, np.abs(current)),
-        "electrical_energy": p[kernel.VOLTAGE] * states[:, kernel.CHARGE] - p[kernel.INTERNAL] * drawn,
-        "resistive_energy": states[:, kernel.HEAT],
-        "magnetic_energy": 0.5 * p[kernel.INDUCTANCE] * current**2,
-        "conversion_energy": (p[kernel.EMF] - p[kernel.TORQUE]) * slip * p[kernel.TORQUE] * square,
+        "electrical_energy": p[core.AXIAL_VOLTAGE] * states[:, core.AXIAL_STATE_CHARGE]
+        - p[core.AXIAL_INTERNAL_RESISTANCE] * drawn,
+        "resistive_energy": states[:, core.AXIAL_STATE_HEAT],
+        "magnetic_energy": 0.5 * p[core.AXIAL_INDUCTANCE] * current**2,
+        "conversion_energy": (p[core.AXIAL_BACK_EMF] - p[core.AXIAL_TORQUE_CONSTANT])
+        * slip
+        * p[core.AXIAL_TORQUE_CONSTANT]
+        * square,
     }
 
 

@@ -33,8 +33,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.kernels import rigid_links
-from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
@@ -132,9 +131,9 @@ def free_motion(
     release = Release(table, placed, requested, height, contact, tail_rate, friction, weight)
     held, links = prepare_release(ready, release)
     state = released_state(ready, links, placed, touching.azimuth)
-    gap = float(observed_at(links, state)[rigid_links.FILM])
+    gap = float(observed_at(links, state)[core.SEEN_FILM])
     _check_until(until, gap)
-    load_size = abs(float(links.weight[: rigid_links.MOMENT_BODY].sum())) * links.length
+    load_size = abs(float(links.weight[: core.WEIGHT_MOMENT_BODY].sum())) * links.length
     heavy = load_size > _LIGHT * links.torque
     tell = progress or (lambda _what, _done, _total: None)
     sign = float(np.sign(held.tail_rotation_rate))
@@ -186,8 +185,8 @@ def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRob
         drive = held.robot.drive
         return held, links.at_duty(1.0 if drive is None else drive.duty)
     changed = links.drive.copy()
-    changed[rigid_links.KIND], changed[rigid_links.DUTY] = rigid_links.RATE, 1.0
-    changed[rigid_links.GIVEN] = held.tail_rotation_rate
+    changed[core.DRIVE_KIND], changed[core.DRIVE_DUTY] = core.RATE, 1.0
+    changed[core.DRIVE_GIVEN] = held.tail_rotation_rate
     return held, replace(links, drive=changed)
 
 
@@ -201,13 +200,13 @@ def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, 
     """Means of a motion from a state, (19,), over a time, s, with `turns` of the tail in it."""
     samples = min(turns * _SAMPLES, _MOST_SAMPLES)
     moments = np.linspace(0.0, time, samples + 1)
-    duty = float(links.drive[rigid_links.DUTY])
+    duty = float(links.drive[core.DRIVE_DUTY])
     start = state.copy()
-    start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0
-    start[rigid_links.CURRENT + 1 :] = 0.0
+    start[[core.STATE_POSITION, core.STATE_ROLL]] = 0.0
+    start[core.STATE_CURRENT + 1 :] = 0.0
     switches = [Switch(0.0, duty)]
     followed = integrate(links, start, moments, switches, Reach())
-    more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
+    more = {"mean_flow": followed.observed[:, core.SEEN_MEAN_FLOW]}
     series = dataset_of(held, links, followed, switches, more, {})
 
     def mean(name: str) -> float:

@@ -29,7 +29,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.film_surface import FilmBody
-from spirillum.kernels import core, rigid_links
+from spirillum.kernels import core
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
@@ -69,12 +69,12 @@ def films_of(robot: Robot, roughness: float | None, drag: float, load: float) ->
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
-        return WallFilms(np.array([np.inf, height, np.inf, load]), np.zeros((0, kernel.RING)))
+        return WallFilms(np.array([np.inf, height, np.inf, load]), np.zeros((0, core.RING_SIZE)))
     robot.check_body("motion beside the wall of a channel, with lubrication films,", ", or channel = 'none'")
     channel = 0.5 * robot.channel.diameter
     rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
     spots = np.array(rows)
-    spots[:, kernel.FILM_RESISTANCE] /= spots[:, kernel.FILM_REACH] ** spots[:, kernel.FILM_POWER]
+    spots[:, core.RING_RESISTANCE] /= spots[:, core.RING_REACH] ** spots[:, core.RING_POWER]
     return WallFilms(np.array([channel, height, _STIFFEST * drag, load]), spots)
 
 
@@ -133,11 +133,11 @@ def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
 
 
 _KINDS = {
-    "dc-motor": rigid_links.MOTOR,
-    "torque": rigid_links.TORQUE,
-    "rate": rigid_links.RATE,
-    "magnetic": rigid_links.MAGNETIC,
-    "torque-speed": rigid_links.CURVE,
+    "dc-motor": core.MOTOR,
+    "torque": core.TORQUE,
+    "rate": core.RATE,
+    "magnetic": core.MAGNETIC,
+    "torque-speed": core.CURVE,
 }
 _Robot = TypeVar("_Robot", bound="FreeRobot")
 """Instead of `Self`, which checks of shapes take in classes as a whole only."""
@@ -157,7 +157,7 @@ class FreeRobot(ABC):
     weight: Samples
     """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
     drive: Samples
-    """Drive and motor (48,), see `spirillum.kernels.rigid_links`."""
+    """`Drive` of csrc/links.h, (48,)."""
     table: Samples = field(default_factory=lambda: np.zeros(0))
     """The robot's table in its tube, see `spirillum.kernels.tube_table`; empty without walls."""
     length: float
@@ -211,7 +211,7 @@ class FreeRobot(ABC):
     def at_duty(self: _Robot, duty: float) -> _Robot:
         """The robot at the duty of the remote; a field or a prescribed rate is on at any duty but 0."""
         drive = self.drive.copy()
-        drive[rigid_links.DUTY] = duty
+        drive[core.DRIVE_DUTY] = duty
         return replace(self, drive=drive)
 
     def between(self: _Robot, start: float, stop: float) -> _Robot:  # noqa: ARG002 - of a tube
@@ -227,15 +227,15 @@ class FreeRobot(ABC):
 
         The small change of time is 0 where nothing depends on time; (21,).
         """
-        resistance = self.drive[rigid_links.CONSTANT]
-        current = self.drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
-        found = np.ones(rigid_links.STATES + 2)
-        found[rigid_links.POSITION : rigid_links.POSITION + 3] = self.length
-        found[rigid_links.CURRENT] = found[rigid_links.CHARGE] = current
-        found[rigid_links.ELECTRICAL : rigid_links.CHARGE] = max(self.drive[rigid_links.VOLTAGE] * current, self.torque)
-        found[rigid_links.DRIVEN : rigid_links.STATES] = self.torque
-        changing = self.drive[rigid_links.KIND] == rigid_links.MAGNETIC or self.bends.size > 1
-        found[rigid_links.STATES :] = 1e-6 * self.turn if changing else 0.0, self.turn
+        resistance = self.drive[core.DRIVE_CONSTANT]
+        current = self.drive[core.DRIVE_VOLTAGE] / resistance if resistance > 0 else 1.0
+        found = np.ones(core.STATE_SIZE + 2)
+        found[core.STATE_POSITION : core.STATE_POSITION + 3] = self.length
+        found[core.STATE_CURRENT] = found[core.STATE_CHARGE] = current
+        found[core.STATE_ELECTRICAL : core.STATE_CHARGE] = max(self.drive[core.DRIVE_VOLTAGE] * current, self.torque)
+        found[core.STATE_DRIVEN : core.STATE_SIZE] = self.torque
+        changing = self.drive[core.DRIVE_KIND] == core.MAGNETIC or self.bends.size > 1
+        found[core.STATE_SIZE :] = 1e-6 * self.turn if changing else 0.0, self.turn
         return found
 
 
@@ -245,7 +245,7 @@ def friction_of(batch: RobotBatch, reading: FrictionReading, effective: float) -
     t = friction_torques(reading, np.array([effective]), rotor)
     bb, br, rb, rr = (float(entry[0]) for entry in (t.bb, t.br, t.rb, t.rr))
     found = np.zeros((7, 7))
-    roll, joint = rigid_links.ROTATION, rigid_links.JOINT
+    roll, joint = core.SPIN, core.JOINT
     found[roll, roll], found[roll, joint] = (bb + br) + (rb + rr), br + rr
     found[joint, roll], found[joint, joint] = rb + rr, rr
     return found
@@ -255,7 +255,7 @@ def weight_of(robot: Robot) -> Samples:
     """Weight less buoyancy of both links; zero where the masses are not known."""
     links = links_of(robot)
     if not np.isfinite([link.mass for link in links]).all():
-        return np.zeros(rigid_links.WEIGHT)
+        return np.zeros(core.WEIGHT_SIZE)
     density = robot.fluid.density
     sizes = [link.mass - density * link.volume for link in links]
     moments = [link.mass * link.centre - density * link.volume * link.centroid for link in links]
@@ -264,45 +264,43 @@ def weight_of(robot: Robot) -> Samples:
 
 def drive_of(batch: RobotBatch) -> Samples:
     """Drive and motor of a batch of one at full duty (48,)."""
-    drive = np.zeros(rigid_links.DRIVE)
-    drive[rigid_links.KIND], drive[rigid_links.FIXED] = _KINDS[str(batch.drive)], float(batch.joint == "fixed")
-    drive[rigid_links.DUTY] = 1.0
+    drive = np.zeros(core.DRIVE_SIZE)
+    drive[core.DRIVE_KIND], drive[core.DRIVE_FIXED] = _KINDS[str(batch.drive)], float(batch.joint == "fixed")
+    drive[core.DRIVE_DUTY] = 1.0
     if batch.drive == "torque":
-        drive[rigid_links.GIVEN] = batch.drive_torque[0]
+        drive[core.DRIVE_GIVEN] = batch.drive_torque[0]
     elif batch.drive == "rate":
-        drive[rigid_links.GIVEN] = batch.drive_rate[0]
+        drive[core.DRIVE_GIVEN] = batch.drive_rate[0]
     elif batch.drive == "magnetic":
         moment, angle = float(batch.magnetic_moment[0]), float(batch.moment_angle[0])
-        drive[rigid_links.MOMENT : rigid_links.FIELD] = moment * np.cos(angle), 0.0, moment * np.sin(angle)
-        drive[rigid_links.FIELD], drive[rigid_links.FIELD_RATE] = batch.magnetic_field[0], batch.field_rate[0]
+        drive[core.DRIVE_MOMENT : core.DRIVE_FIELD] = moment * np.cos(angle), 0.0, moment * np.sin(angle)
+        drive[core.DRIVE_FIELD], drive[core.DRIVE_FIELD_RATE] = batch.magnetic_field[0], batch.field_rate[0]
     elif batch.curve is not None:
-        drive[rigid_links.POLARITY] = batch.curve.sense * batch.hand[0]
-        drive[rigid_links.CURVE_POINTS :] = packed_curve(batch.curve)
+        drive[core.DRIVE_POLARITY] = batch.curve.sense * batch.hand[0]
+        drive[core.DRIVE_POINTS :] = packed_curve(batch.curve)
     elif batch.electrics is not None:
-        drive[rigid_links.TORQUE_CONSTANT : rigid_links.AXIS_Y] = [column[0] for column in batch.electrics.columns]
-        drive[rigid_links.DUTY] = batch.electrics.duty[0]
+        drive[core.DRIVE_TORQUE_CONSTANT : core.DRIVE_AXIS_Y] = [column[0] for column in batch.electrics.columns]
+        drive[core.DRIVE_DUTY] = batch.electrics.duty[0]
     return drive
 
 
 def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
     """The largest of the torques of stall, field, prescribed drive or rate, and weight, N m."""
-    kind = drive[rigid_links.KIND]
-    field = float(np.linalg.norm(drive[rigid_links.MOMENT : rigid_links.FIELD])) * drive[rigid_links.FIELD]
-    given = abs(drive[rigid_links.GIVEN]) * (
-        float(drag[rigid_links.JOINT, rigid_links.JOINT]) if kind == rigid_links.RATE else 1.0
-    )
-    heavy = float(np.abs(weight[: rigid_links.MOMENT_BODY]).sum()) * float(np.sqrt(drag[4, 4] / drag[1, 1]))
-    resistance = drive[rigid_links.CONSTANT]
-    stall = drive[rigid_links.TORQUE_CONSTANT] * drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 0.0
-    stall = max(stall, drive[rigid_links.CURVE_AT + 1])
-    return float(max(stall, field, given if kind in (rigid_links.TORQUE, rigid_links.RATE) else 0.0, heavy, 1e-300))
+    kind = drive[core.DRIVE_KIND]
+    field = float(np.linalg.norm(drive[core.DRIVE_MOMENT : core.DRIVE_FIELD])) * drive[core.DRIVE_FIELD]
+    given = abs(drive[core.DRIVE_GIVEN]) * (float(drag[core.JOINT, core.JOINT]) if kind == core.RATE else 1.0)
+    heavy = float(np.abs(weight[: core.WEIGHT_MOMENT_BODY]).sum()) * float(np.sqrt(drag[4, 4] / drag[1, 1]))
+    resistance = drive[core.DRIVE_CONSTANT]
+    stall = drive[core.DRIVE_TORQUE_CONSTANT] * drive[core.DRIVE_VOLTAGE] / resistance if resistance > 0 else 0.0
+    stall = max(stall, drive[core.DRIVE_AT + 1])
+    return float(max(stall, field, given if kind in (core.TORQUE, core.RATE) else 0.0, heavy, 1e-300))
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwoLinks(FreeRobot):
     """A robot in unbounded fluid, with films between it and a channel's wall: see `spirillum.kernels.two_links`."""
 
-    observed: ClassVar[int] = rigid_links.OBSERVED
+    observed: ClassVar[int] = core.SEEN_CONTACT_FORCE
 
     drag: Samples
     """Resistance of both links against the seven rates at phase 0 of the tail (7, 7)."""
@@ -324,12 +322,12 @@ class TwoLinks(FreeRobot):
     @property
     def roughness(self) -> float:
         """Height of the wall's asperities, m."""
-        return float(self.wall[kernel.ROUGHNESS])
+        return float(self.wall[core.WALL_ROUGHNESS])
 
     @property
     def is_walled(self) -> bool:
         """Whether there are films at a wall."""
-        return bool(np.isfinite(self.wall[kernel.RADIUS]))
+        return bool(np.isfinite(self.wall[core.WALL_RADIUS]))
 
     def contact_event(self, site: int, *, touches: bool) -> str:  # noqa: ARG002 - of a tube
         """The roughness carries, or no longer does."""
@@ -350,7 +348,7 @@ def two_links(
     """Everything that a robot's rates follow from."""
     resistance = calibrated_resistance(batch, model, calibrated=calibrated)[0]
     drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
-    heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(batch)
+    heavy, drive = weight_of(robot) if weight else np.zeros(core.WEIGHT_SIZE), drive_of(batch)
     length, torque = float(np.sqrt(drag[4, 4] / drag[1, 1])), torque_scale(drag, heavy, drive)
     films = films_of(robot, roughness, float(drag[1, 1]), torque / length)
     return TwoLinks(
@@ -362,5 +360,5 @@ def two_links(
         drive=drive,
         length=length,
         torque=torque,
-        turn=2.0 * np.pi * float(drag[rigid_links.ROTATION, rigid_links.ROTATION]) / torque,
+        turn=2.0 * np.pi * float(drag[core.SPIN, core.SPIN]) / torque,
     )

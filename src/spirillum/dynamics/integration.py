@@ -1,6 +1,6 @@
 """Integration of a free robot's motion in time, with its events.
 
-The gap, dry friction and the motor's current are stiff: `spirillum.kernels.stiff_steps` takes linearly implicit steps.
+The gap, dry friction and the motor's current are stiff: csrc/stiff_steps.c takes linearly implicit steps.
 Samples and events lie inside them on the method's continuous output, so that a step is as long as the motion allows.
 A run keeps the beginning of its last step: continued from there, it is the longer run to rounding.
 """
@@ -19,7 +19,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
-from spirillum.kernels import core, rigid_links, stiff_steps
+from spirillum.kernels import core
 
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
@@ -77,7 +77,7 @@ class Trajectory:
     duty: Samples
     """Duty of the drive up to each sample, (n,)."""
     states: Samples
-    """States, see `spirillum.kernels.rigid_links` (n, 19)."""
+    """States, `State` of csrc/links.h, (n, 19)."""
     observed: Samples
     """What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 31) observes."""
     events: tuple[Event, ...]
@@ -107,12 +107,12 @@ class _Run:
     memory: Samples
     gaps: Samples
     before: Samples
-    increments: Samples = field(default_factory=lambda: np.zeros((8, rigid_links.STATES)))
+    increments: Samples = field(default_factory=lambda: np.zeros((8, core.STATE_SIZE)))
     jacobian: Samples = field(default_factory=lambda: np.zeros((8, 8)))
 
     @property
     def time(self) -> float:
-        return float(self.memory[stiff_steps.TIME])
+        return float(self.memory[core.MEMORY_TIME])
 
 
 def integrate(
@@ -131,11 +131,11 @@ def integrate(
     end = float(time[-1])
     going_on = isinstance(start, Checkpoint)
     state = np.array(start.state if isinstance(start, Checkpoint) else start, dtype=float)
-    memory = np.zeros(stiff_steps.MEMORY)
-    memory[stiff_steps.TIME] = start.time if isinstance(start, Checkpoint) else time[0]
-    memory[stiff_steps.STEP] = start.step if isinstance(start, Checkpoint) else first_step(robot)
-    memory[stiff_steps.LAST_TIME], memory[stiff_steps.LAST_STEP] = memory[stiff_steps.TIME], memory[stiff_steps.STEP]
-    run = _Run(robot, reach, state, memory, np.ones(robot.gap_count + stiff_steps.WATCHED), state.copy())
+    memory = np.zeros(core.MEMORY_SIZE)
+    memory[core.MEMORY_TIME] = start.time if isinstance(start, Checkpoint) else time[0]
+    memory[core.MEMORY_STEP] = start.step if isinstance(start, Checkpoint) else first_step(robot)
+    memory[core.MEMORY_LAST_TIME], memory[core.MEMORY_LAST_STEP] = memory[core.MEMORY_TIME], memory[core.MEMORY_STEP]
+    run = _Run(robot, reach, state, memory, np.ones(robot.gap_count + core.WATCHED), state.copy())
     pieces: list[tuple[Samples, Samples, float]] = []
     events: list[Event] = []
     first = run.time
@@ -173,7 +173,7 @@ def first_step(robot: FreeRobot) -> float:
 def run_sizes(robot: FreeRobot) -> Samples:
     """`FreeRobot.step_sizes` of a run, whose works may be those of a robot that only sinks."""
     sizes = robot.step_sizes()
-    sizes[rigid_links.DRIVEN : rigid_links.STATES] *= _LITTLE_WORK
+    sizes[core.STATE_DRIVEN : core.STATE_SIZE] *= _LITTLE_WORK
     return sizes
 
 
@@ -201,9 +201,9 @@ def _stretch(
 ) -> _Stretch:
     robot = run.robot.at_duty(duty).between(run.time, stop)
     data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
-    outside = float(observed_at(robot, run.state)[rigid_links.OUTSIDE]) if robot.table.size else 0.0
+    outside = float(observed_at(robot, run.state)[core.SEEN_OUTSIDE]) if robot.table.size else 0.0
     core.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
-    states = np.empty((inside.size, rigid_links.STATES))
+    states = np.empty((inside.size, core.STATE_SIZE))
     sizes, done = run_sizes(robot), 0
     events: list[Event] = []
     clip = stop <= end
@@ -216,18 +216,18 @@ def _stretch(
                 run.jacobian, run.gaps, inside[done:], states[done:], sizes, limits, robot.roughness, data,
                 robot.table,
             )  # fmt: skip
-            done += int(run.memory[stiff_steps.ANSWERED])
+            done += int(run.memory[core.MEMORY_ANSWERED])
             tell(run.time)
-            if status == stiff_steps.CROSSED:
+            if status == core.CROSSED:
                 what = _crossed(run, robot, data, limits, watched, min(end, target), events)
                 if what:
                     done = int(np.count_nonzero(inside[:done] <= run.time))
                     break
-            elif status == stiff_steps.STUCK:
+            elif status == core.STUCK:
                 what = f"{_STUCK}: the motion cannot be followed beyond t = {run.time:.6g} s"
                 events.append(Event(run.time, what))
                 break
-            elif status == stiff_steps.DONE:
+            elif status == core.DONE:
                 break
     except KeyboardInterrupt:
         what = INTERRUPTED
@@ -242,17 +242,17 @@ def _crossed(
     run: _Run, robot: FreeRobot, data: Samples, limits: Samples, watched: Samples, end: float, events: list[Event]
 ) -> str:
     """Note what happened in the last step; what ends the stretch, with the state where it does, or nothing."""
-    begin = float(run.memory[stiff_steps.LAST_TIME])
+    begin = float(run.memory[core.MEMORY_LAST_TIME])
     length = run.time - begin
-    new, inner, gaps = run.state.copy(), np.empty(rigid_links.STATES), np.empty_like(run.gaps)
-    dy = np.empty(rigid_links.STATES)
+    new, inner, gaps = run.state.copy(), np.empty(core.STATE_SIZE), np.empty_like(run.gaps)
+    dy = np.empty(core.STATE_SIZE)
 
     def at(index: int, share: float) -> float:
         core.interpolate(share, run.before, new, run.increments, inner)
         outside = 0.0
-        if index == gaps.size - stiff_steps.WATCHED + stiff_steps.INSIDE:
+        if index == gaps.size - core.WATCHED + core.WITHIN:
             core.rates(dy, begin + share * length, inner, data, robot.table)
-            outside = float(data[rigid_links.OUTSIDE])
+            outside = float(data[core.SEEN_OUTSIDE])
         core.watched(inner, outside, data, robot.table, limits, robot.roughness, gaps)
         return float(gaps[index])
 
@@ -267,15 +267,15 @@ def _crossed(
             events.append(Event(moment, robot.contact_event(index, touches=bool(watched[index] > 0))))
             continue
         at(index, share)
-        if index == sites + stiff_steps.CHARGE_LEFT:
+        if index == sites + core.CHARGE_LEFT:
             what = BATTERY_EMPTY
-        elif index == sites + stiff_steps.ROOM:
+        elif index == sites + core.ROOM:
             what = END_OF_CHANNEL
         else:
             what = robot.range_left(inner, moment)
         run.state[:] = inner
-        run.memory[stiff_steps.TIME] = moment
-        run.memory[stiff_steps.STEP] = run.memory[stiff_steps.LAST_STEP]
+        run.memory[core.MEMORY_TIME] = moment
+        run.memory[core.MEMORY_STEP] = run.memory[core.MEMORY_LAST_STEP]
         events.append(Event(moment, what))
         return what
     return ""
@@ -295,12 +295,12 @@ def _crossing(value: Callable[[float], float]) -> float:
 
 
 def watched_limits(robot: FreeRobot, reach: Reach, *, spent: bool = False) -> Samples:
-    """Where tube and battery end, as `spirillum.kernels.stiff_steps` reads it; a spent battery ends no more."""
-    found = np.empty(stiff_steps.LIMITS)
-    found[stiff_steps.CHANNEL], found[stiff_steps.MIDDLE] = reach.channel, reach.middle
-    found[stiff_steps.NOSE], found[stiff_steps.TIP] = reach.nose, reach.tip
-    motor = robot.drive[rigid_links.KIND] == rigid_links.MOTOR
-    found[stiff_steps.MOST_CHARGE] = reach.charge if motor and not spent else np.inf
+    """Where tube and battery end, `Limits` of csrc/motion.h; a spent battery ends no more."""
+    found = np.empty(core.LIMITS_SIZE)
+    found[core.LIMITS_CHANNEL], found[core.LIMITS_MIDDLE] = reach.channel, reach.middle
+    found[core.LIMITS_NOSE], found[core.LIMITS_TIP] = reach.nose, reach.tip
+    motor = robot.drive[core.DRIVE_KIND] == core.MOTOR
+    found[core.LIMITS_MOST_CHARGE] = reach.charge if motor and not spent else np.inf
     return found
 
 
@@ -322,6 +322,6 @@ def _joined(
     switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if times[0] <= s.time <= times[-1]]
     happened = tuple(sorted([*switched, *events], key=lambda event: event.time))
     last = Checkpoint(
-        float(run.memory[stiff_steps.LAST_TIME]), float(run.memory[stiff_steps.LAST_STEP]), tuple(run.before.tolist())
+        float(run.memory[core.MEMORY_LAST_TIME]), float(run.memory[core.MEMORY_LAST_STEP]), tuple(run.before.tolist())
     )
     return Trajectory(times, duties, states, np.concatenate(observed), happened, last)

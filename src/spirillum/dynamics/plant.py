@@ -45,8 +45,7 @@ from spirillum.errors import InputError, clipped
 from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.kernels import rigid_links
-from spirillum.kernels import tube_motion as tube
+from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
@@ -363,8 +362,8 @@ class Plant:
     def _check_stokes(self, run: Trajectory) -> None:
         """Add what a step breaks of Stokes flow to the warnings, once for each limit."""
         seen, batch = run.observed, self.steady.batch
-        rates = seen[:, rigid_links.ROTATION] + seen[:, rigid_links.JOINT]
-        limits = motion_limits(batch, seen[:, : rigid_links.ROTATION], rates)
+        rates = seen[:, core.SPIN] + seen[:, core.JOINT]
+        limits = motion_limits(batch, seen[:, : core.SPIN], rates)
         limits.append(flow_limit(batch, abs(self._now.flow or 0.0)))
         new = {flag: note for flag, note in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
         self._inertia += tuple(new)
@@ -412,22 +411,22 @@ class Plant:
     def _azimuth(self, run: Trajectory) -> float:
         if not isinstance(self._links, TubeRobot):
             return 0.0
-        found = float(run.observed[-1, tube.AZIMUTH])
+        found = float(run.observed[-1, core.SEEN_AZIMUTH])
         return found + _TURN * round((self._now.azimuth - found) / _TURN)
 
     def _moment(self, run: Trajectory) -> Snapshot:
         series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))
-        series["tail_angle"] = tail_angle_of(run.states, self._first.state[rigid_links.PHASE])
+        series["tail_angle"] = tail_angle_of(run.states, self._first.state[core.STATE_PHASE])
         if isinstance(self._links, TubeRobot):
             series |= series_in_tube(run) | {"azimuth": np.array([self._azimuth(run)])}
         elif self.roughness is not None:
-            series["wall_gap"] = run.observed[:, rigid_links.FILM] + self.roughness
+            series["wall_gap"] = run.observed[:, core.SEEN_FILM] + self.roughness
         state = run.states[-1]
-        attitude = state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
+        attitude = state[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4]
         pose = RobotPose(
-            state[rigid_links.POSITION : rigid_links.POSITION + 3].copy(),
+            state[core.STATE_POSITION : core.STATE_POSITION + 3].copy(),
             attitude / np.linalg.norm(attitude),
-            float(state[rigid_links.PHASE]),
+            float(state[core.STATE_PHASE]),
         )
         values = {name: float(column[-1]) for name, column in series.items()}
         return Snapshot(float(run.time[-1]), pose, values, self._now.ended)

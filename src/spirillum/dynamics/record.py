@@ -13,7 +13,7 @@ from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.integration import BATTERY_EMPTY, Reach, Trajectory
 from spirillum.dynamics.run_summary import STEADY, run_averages, stretches_on
 from spirillum.dynamics.timing import Switch
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.swimming.drives import battery_voltage, winding_resistance
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
-_MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
+_MOMENT = slice(core.DRIVE_MOMENT, core.DRIVE_FIELD)
 
 
 _SOURCE = "two rigid links, (15) with all rows"
@@ -49,20 +49,20 @@ def dataset_of(
     on = stretches_on(switches, driven, float(run.time[0]))
     rotation = _rotations(run.states)
     series = {**series_of(prediction, links, run), **more}
-    weight, phase = links.weight, run.states[:, rigid_links.PHASE]
+    weight, phase = links.weight, run.states[:, core.STATE_PHASE]
     cos, sin = np.cos(phase), np.sin(phase)
-    x, y, z = weight[rigid_links.MOMENT_ROTOR :]
+    x, y, z = weight[core.WEIGHT_MOMENT_ROTOR :]
     rotor = np.stack([np.full_like(phase, x), cos * y - sin * z, sin * y + cos * z], axis=-1)
-    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[rigid_links.MOMENT_BODY : rigid_links.MOMENT_ROTOR] + rotor)
-    heavy = weight[rigid_links.WEIGHT_BODY] + weight[rigid_links.WEIGHT_ROTOR]
-    stored = np.asarray(heavy * run.states[:, rigid_links.POSITION + 2] + lift) + run.observed[:, rigid_links.PRESSED]
+    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[core.WEIGHT_MOMENT_BODY : core.WEIGHT_MOMENT_ROTOR] + rotor)
+    heavy = weight[core.WEIGHT_BODY] + weight[core.WEIGHT_ROTOR]
+    stored = np.asarray(heavy * run.states[:, core.STATE_POSITION + 2] + lift) + run.observed[:, core.SEEN_PRESSED]
     series["potential_energy"] = stored
-    attitude = run.states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
+    attitude = run.states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4]
     attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
-    velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, : rigid_links.ROTATION])
-    spin = np.einsum("nij,nj->ni", rotation, run.observed[:, rigid_links.ROTATION : rigid_links.JOINT])
+    velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, : core.SPIN])
+    spin = np.einsum("nij,nj->ni", rotation, run.observed[:, core.SPIN : core.JOINT])
     vectors = {
-        "position": ("axis", run.states[:, : rigid_links.ATTITUDE]),
+        "position": ("axis", run.states[:, : core.STATE_ATTITUDE]),
         "velocity": ("axis", velocity),
         "angular_velocity": ("axis", spin),
         "attitude": ("quaternion", attitude),
@@ -101,7 +101,7 @@ def series_of(prediction: Prediction, links: FreeRobot, run: Trajectory) -> dict
     if prediction.batch.drive == "dc-motor":
         found |= _electrics(prediction, run)
     if prediction.batch.drive == "magnetic":
-        moment, rate = _in_field(links, rotation @ links.drive[_MOMENT]), links.drive[rigid_links.FIELD_RATE]
+        moment, rate = _in_field(links, rotation @ links.drive[_MOMENT]), links.drive[core.DRIVE_FIELD_RATE]
         field = 0.5 * np.pi + _field_angle(links, run)
         behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
         behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
@@ -133,25 +133,25 @@ def _rotations(states: Samples) -> Samples:
     """Rotation matrices, body axes to lab, (n, 3, 3)."""
     from scipy.spatial.transform import Rotation
 
-    attitude = states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
+    attitude = states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4]
     return np.asarray(Rotation.from_quat(attitude, scalar_first=True).as_matrix())
 
 
 def tail_angle_of(states: Samples, begun: float) -> Samples:
     """Angle of the tail in the lab, rad, (n,), from the phase at the start of the run, rad."""
-    return np.asarray(states[:, rigid_links.ROLL] + states[:, rigid_links.PHASE] - begun)
+    return np.asarray(states[:, core.STATE_ROLL] + states[:, core.STATE_PHASE] - begun)
 
 
 def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     axis = rotation[:, :, 0]
-    roll, phase = states[:, rigid_links.ROLL], states[:, rigid_links.PHASE]
-    body_rate, motor_rate = rates[:, rigid_links.ROTATION], rates[:, rigid_links.JOINT]
+    roll, phase = states[:, core.STATE_ROLL], states[:, core.STATE_PHASE]
+    body_rate, motor_rate = rates[:, core.SPIN], rates[:, core.JOINT]
     return {
         "tail_phase": phase,
         "tail_angle": tail_angle_of(states, float(phase[0])),
         "body_angle": roll,
-        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, : rigid_links.ROTATION], axis=1),
+        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, : core.SPIN], axis=1),
         "tail_rotation_rate": body_rate + motor_rate,
         "body_rotation_rate": body_rate,
         "motor_rotation_rate": motor_rate,
@@ -163,43 +163,43 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
 
 def _powers(links: FreeRobot, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
-    drive, motor_rate = rates[:, rigid_links.DRIVE_TORQUE], rates[:, rigid_links.JOINT]
-    if links.drive[rigid_links.FIXED]:  # one piece, driven from outside
+    drive, motor_rate = rates[:, core.SEEN_DRIVE_TORQUE], rates[:, core.JOINT]
+    if links.drive[core.DRIVE_FIXED]:  # one piece, driven from outside
         torque = drive + _field_torque(links, run, rotation)
-        shaft = rates[:, rigid_links.DRIVE_POWER]
+        shaft = rates[:, core.SEEN_DRIVE_POWER]
     else:  # what is left of the motor's torque after friction in the joint
-        against_body, against_motor = links.friction[rigid_links.JOINT, [rigid_links.ROTATION, rigid_links.JOINT]]
-        torque = drive - against_body * rates[:, rigid_links.ROTATION] - against_motor * motor_rate
+        against_body, against_motor = links.friction[core.JOINT, [core.SPIN, core.JOINT]]
+        torque = drive - against_body * rates[:, core.SPIN] - against_motor * motor_rate
         shaft = torque * motor_rate
     return {
         "drive_torque": torque,
-        "drive_power": rates[:, rigid_links.DRIVE_POWER],
+        "drive_power": rates[:, core.SEEN_DRIVE_POWER],
         "shaft_power": shaft,
-        "friction_power": rates[:, rigid_links.FRICTION_POWER],
-        "dissipated_power": rates[:, rigid_links.DISSIPATED_POWER],
-        "drive_energy": states[:, rigid_links.DRIVEN],
-        "friction_energy": states[:, rigid_links.FRICTION],
-        "dissipated_energy": states[:, rigid_links.DISSIPATED],
+        "friction_power": rates[:, core.SEEN_FRICTION_POWER],
+        "dissipated_power": rates[:, core.SEEN_DISSIPATED_POWER],
+        "drive_energy": states[:, core.STATE_DRIVEN],
+        "friction_energy": states[:, core.STATE_FRICTION],
+        "dissipated_energy": states[:, core.STATE_DISSIPATED],
     }
 
 
 def _field_torque(links: FreeRobot, run: Trajectory, rotation: Samples) -> Samples:
     """Torque of the field about its own axis, N m; zero without one."""
     moment, angle = _in_field(links, rotation @ links.drive[_MOMENT]), _field_angle(links, run)
-    if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
+    if links.drive[core.DRIVE_KIND] != core.MAGNETIC:
         return np.zeros_like(angle)
-    field = links.drive[rigid_links.FIELD] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+    field = links.drive[core.DRIVE_FIELD] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
 
 
 def _field_angle(links: FreeRobot, run: Trajectory) -> Samples:
     """Angle by which the field has turned since it pointed up, rad."""
-    return np.asarray(links.drive[rigid_links.FIELD_RATE] * run.time + links.drive[rigid_links.FIELD_PHASE])
+    return np.asarray(links.drive[core.DRIVE_FIELD_RATE] * run.time + links.drive[core.DRIVE_FIELD_PHASE])
 
 
 def _in_field(links: FreeRobot, vectors: Samples) -> Samples:
     """Vectors of the lab along the axis about which the field turns, and across it as y and z are to x, (n, 3)."""
-    side, up = links.drive[rigid_links.AXIS_Y : rigid_links.FIELD_PHASE]
+    side, up = links.drive[core.DRIVE_AXIS_Y : core.DRIVE_FIELD_PHASE]
     axis = np.array([np.sqrt(1.0 - side**2 - up**2), side, up])
     across = [e - axis @ e * (axis + _X) / (1.0 + axis[0]) for e in np.eye(3)[1:]]
     return np.asarray(vectors @ np.array([axis, *across]).T)
@@ -210,19 +210,19 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
     assert motor is not None  # noqa: S101 - a dc-motor has one
     sign, inductance = float(motor.polarity[0]), float(motor.inductance[0])
     states = run.states
-    current = states[:, rigid_links.CURRENT]
+    current = states[:, core.STATE_CURRENT]
     voltage = battery_voltage(motor, current)
     return {
-        "motor_torque": run.observed[:, rigid_links.DRIVE_TORQUE],
+        "motor_torque": run.observed[:, core.SEEN_DRIVE_TORQUE],
         "motor_current": sign * current,
         "motor_resistance": winding_resistance(motor, current),
         "battery_voltage": voltage,
         "electrical_power": run.duty * voltage * current,
-        "electrical_energy": states[:, rigid_links.ELECTRICAL],
-        "resistive_energy": states[:, rigid_links.RESISTIVE],
+        "electrical_energy": states[:, core.STATE_ELECTRICAL],
+        "resistive_energy": states[:, core.STATE_RESISTIVE],
         "magnetic_energy": 0.5 * inductance * current**2,
-        "conversion_energy": states[:, rigid_links.CONVERSION],
-        "battery_charge_used": states[:, rigid_links.CHARGE],
+        "conversion_energy": states[:, core.STATE_CONVERSION],
+        "battery_charge_used": states[:, core.STATE_CHARGE],
     }
 
 

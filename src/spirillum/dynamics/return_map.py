@@ -19,9 +19,8 @@ from spirillum.dynamics.integration import Reach, observed_at, watched_limits
 from spirillum.dynamics.start import state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
-from spirillum.kernels import core, rigid_links, stiff_steps
-from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.contacts import SITE_ROTOR
+from spirillum.kernels import core
+from spirillum.kernels.core import SITE_ROTOR
 
 SEARCHING = 10.0 * TubeRobot.tolerance
 """Error of a time step during the search for a fixed point, which is refined at that of a run, as is its multiplier."""
@@ -30,7 +29,7 @@ _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
 _MOST_STEPS = 75_000
 """Steps in time of a run and of all searches for its fixed point: some 1,300 turns, fewer where the tail touches."""
-_COUNTED = [rigid_links.POSITION, rigid_links.ROLL, *range(rigid_links.CURRENT + 1, rigid_links.STATES)]
+_COUNTED = [core.STATE_POSITION, core.STATE_ROLL, *range(core.STATE_CURRENT + 1, core.STATE_SIZE)]
 """What counts from the start of a turn."""
 
 STEPS = ("time", "x", "roll", "gap", "azimuth", "pitch", "yaw", "contact_force", "offset")
@@ -51,6 +50,12 @@ _APART = 0.01 * _LONGEST
 """Distances from a fixed point at which its multiplier is measured."""
 _LITTLE = 1e-6
 """Differences of a state's components over their sizes and the gap."""
+ACTING = (
+    *(core.STATE_POSITION + 1, core.STATE_POSITION + 2),
+    *range(core.STATE_ATTITUDE, core.STATE_ATTITUDE + 4),
+    *(core.STATE_PHASE, core.STATE_CURRENT),
+)
+"""Components of the state on which the rates depend: position across the tube, attitude, tail phase, current."""
 _TAIL, _ANGLES = 4, [0, 4, 5]
 """Where a chart has the angle of the tail, and angles that are the same after a turn."""
 
@@ -65,7 +70,7 @@ class Turn(NamedTuple):
     steps: Samples
     """What is in `STEPS` at each step, all from the start of the turn, (n, 9)."""
     tangent: Samples
-    """Derivative of what acts (`stiff_steps.ACTING`) after `time` by that at its start, (8, 8)."""
+    """Derivative of what acts (`ACTING`) after `time` by that at its start, (8, 8)."""
 
 
 class EndedTurnError(InputError):
@@ -95,38 +100,38 @@ class ReturnMap:
         limits, sizes = watched_limits(robot, Reach()), robot.step_sizes()
         y = state.copy()
         y[_COUNTED] = 0.0
-        memory = np.zeros(stiff_steps.MEMORY)
-        memory[stiff_steps.STEP] = _FIRST * robot.turn
-        gaps = np.ones(robot.gap_count + stiff_steps.WATCHED)
-        increments, before, jacobian = np.zeros((8, rigid_links.STATES)), y.copy(), np.zeros((8, 8))
+        memory = np.zeros(core.MEMORY_SIZE)
+        memory[core.MEMORY_STEP] = _FIRST * robot.turn
+        gaps = np.ones(robot.gap_count + core.WATCHED)
+        increments, before, jacobian = np.zeros((8, core.STATE_SIZE)), y.copy(), np.zeros((8, 8))
         core.watched(y, 0.0, data, robot.table, limits, robot.roughness, gaps)
-        nothing, none = np.empty(0), np.empty((0, rigid_links.STATES))
-        begun = observed_at(robot, y)[kernel.TURN], y[rigid_links.PHASE]
+        nothing, none = np.empty(0), np.empty((0, core.STATE_SIZE))
+        begun = observed_at(robot, y)[core.SEEN_TURN], y[core.STATE_PHASE]
         noted: list[tuple[float, ...]] = []
         jacobians: list[Samples] = []
-        while self._turned(y, data[kernel.TURN], begun) < 2.0 * np.pi or not noted:
+        while self._turned(y, data[core.SEEN_TURN], begun) < 2.0 * np.pi or not noted:
             status = core.advance(
                 np.inf, _ON, 1, self.tolerance, memory, y, before, increments, jacobian, gaps, nothing, none,
                 sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
-            time = float(memory[stiff_steps.TIME])
+            time = float(memory[core.MEMORY_TIME])
             self.steps[0] += 1
             if words := self._ended(status, y, time, gaps):
                 raise EndedTurnError(words, _part(before, noted, jacobians))
             noted.append(_noted(time, y, data))
             jacobians.append(jacobian.copy())
         end, share = self._at_the_angle(before, y, increments, begun)
-        last = float(memory[stiff_steps.LAST_TIME])
-        time = last + share * (float(memory[stiff_steps.TIME]) - last)
+        last = float(memory[core.MEMORY_LAST_TIME])
+        time = last + share * (float(memory[core.MEMORY_TIME]) - last)
         steps = np.array(noted)
         tangent = _tangent(np.array([0.0, *steps[:-1, 0], time]), np.array(jacobians))
         return Turn(end, time, steps[steps[:, 0] <= time], tangent)
 
     def _ended(self, status: int, y: Samples, time: float, gaps: Samples) -> str:
         """Why a turn ends after a step, before the tail has turned; empty where it continues."""
-        if status == stiff_steps.STUCK:
+        if status == core.STUCK:
             return "no step is small enough to follow the motion; allowed: a larger roughness"
-        if gaps[-stiff_steps.WATCHED + stiff_steps.INSIDE] < 0:
+        if gaps[-core.WATCHED + core.WITHIN] < 0:
             return f"{self.robot.range_left(y, time)}; allowed: another start, or motion 'held'"
         if time > _STALLED * self.robot.turn:
             return "the tail hardly turns there; allowed: a stronger drive, or motion 'held'"
@@ -136,8 +141,8 @@ class ReturnMap:
 
     def _turned(self, y: Samples, turn: float, begun: tuple[float, float]) -> float:
         """Angle by which the tail has turned relative to the nearest wall, rad."""
-        raw = turn + y[rigid_links.PHASE] - begun[0] - begun[1]
-        counted = y[rigid_links.ROLL] + y[rigid_links.PHASE] - begun[1]
+        raw = turn + y[core.STATE_PHASE] - begun[0] - begun[1]
+        counted = y[core.STATE_ROLL] + y[core.STATE_PHASE] - begun[1]
         return float(self.sign * (raw + 2.0 * np.pi * np.round((counted - raw) / (2.0 * np.pi))))
 
     def _at_the_angle(
@@ -146,11 +151,11 @@ class ReturnMap:
         """State and share of the last step at which the turn is complete."""
         from scipy.optimize import brentq
 
-        inner = np.empty(rigid_links.STATES)
+        inner = np.empty(core.STATE_SIZE)
 
         def left(share: float) -> float:
             core.interpolate(share, before, new, increments, inner)
-            return self._turned(inner, observed_at(self.robot, inner)[kernel.TURN], begun) - 2.0 * np.pi
+            return self._turned(inner, observed_at(self.robot, inner)[core.SEEN_TURN], begun) - 2.0 * np.pi
 
         share = float(brentq(left, 0.0, 1.0, xtol=1e-13))
         left(share)
@@ -178,11 +183,11 @@ def _tangent(times: Samples, jacobians: Samples) -> Samples:
 def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:
     return (
         time,
-        float(y[rigid_links.POSITION]),
-        float(y[rigid_links.ROLL]),
-        *(float(data[index]) for index in (rigid_links.FILM, kernel.AZIMUTH, kernel.WALL_PITCH, kernel.WALL_YAW)),
-        float(data[kernel.CONTACT_FORCE]),
-        float(data[kernel.OFFSET]),
+        float(y[core.STATE_POSITION]),
+        float(y[core.STATE_ROLL]),
+        *(float(data[index]) for index in (core.SEEN_FILM, core.SEEN_AZIMUTH, core.SEEN_PITCH, core.SEEN_YAW)),
+        float(data[core.SEEN_CONTACT_FORCE]),
+        float(data[core.SEEN_OFFSET]),
     )
 
 
@@ -295,8 +300,8 @@ class _Chart:
 
     def __init__(self, turns: ReturnMap, state: Samples) -> None:
         self._turns, self._robot = turns, turns.robot
-        self._phase = float(observed_at(self._robot, state)[kernel.TURN] + state[rigid_links.PHASE])
-        self.current = float(state[rigid_links.CURRENT])
+        self._phase = float(observed_at(self._robot, state)[core.SEEN_TURN] + state[core.STATE_PHASE])
+        self.current = float(state[core.STATE_CURRENT])
         """Current of the motor, A: it follows the motion within a small part of a turn."""
 
     def coordinates(self, state: Samples) -> Samples:
@@ -312,10 +317,10 @@ class _Chart:
         def at(offset: float) -> Samples:
             return state_at(offset, self._phase, pitch, yaw, azimuth)
 
-        low, high = (share * float(self._robot.tube[kernel.RADIUS]) for share in (1e-6, 1.0))
+        low, high = (share * float(self._robot.tube[core.TUBE_RADIUS]) for share in (1e-6, 1.0))
         offset = brentq(lambda e: self._closeness(at(e)) - closeness, low, high, xtol=1e-15 * high, rtol=1e-15)
         found = at(float(offset))
-        found[rigid_links.CURRENT] = self.current
+        found[core.STATE_CURRENT] = self.current
         return found
 
     def change(self, x: Samples) -> _Change | None:
@@ -325,10 +330,10 @@ class _Chart:
             turn = self._turns.after(start)
         except (InputError, ValueError):
             return None
-        self.current = float(turn.state[rigid_links.CURRENT])
-        rates = np.empty(rigid_links.STATES)
+        self.current = float(turn.state[core.STATE_CURRENT])
+        rates = np.empty(core.STATE_SIZE)
         core.rates(rates, 0.0, turn.state, self._robot.data, self._robot.table)
-        after, rate = self._chart_derivative(turn.state), rates[list(stiff_steps.ACTING)]
+        after, rate = self._chart_derivative(turn.state), rates[list(ACTING)]
         moved = after @ turn.tangent @ np.linalg.inv(self._chart_derivative(start))[:, :4]
         drift = after @ rate  # the turn ends where the tail is at its angle again
         derivative = moved[:4] - np.outer(drift[:4], moved[_TAIL]) / drift[_TAIL]
@@ -336,17 +341,17 @@ class _Chart:
 
     def _chart(self, state: Samples) -> Samples:
         """What acts as these four coordinates, angles of tail and body against the wall, |q| and current, (8,)."""
-        seen, attitude = observed_at(self._robot, state), state[rigid_links.ATTITUDE : rigid_links.PHASE]
-        tail = seen[kernel.TURN] + state[rigid_links.PHASE]
-        pose = seen[kernel.AZIMUTH], self._closeness(state), seen[kernel.WALL_PITCH], seen[kernel.WALL_YAW]
-        return np.array([*pose, tail, seen[kernel.TURN], np.linalg.norm(attitude), state[rigid_links.CURRENT]])
+        seen, attitude = observed_at(self._robot, state), state[core.STATE_ATTITUDE : core.STATE_PHASE]
+        tail = seen[core.SEEN_TURN] + state[core.STATE_PHASE]
+        pose = seen[core.SEEN_AZIMUTH], self._closeness(state), seen[core.SEEN_PITCH], seen[core.SEEN_YAW]
+        return np.array([*pose, tail, seen[core.SEEN_TURN], np.linalg.norm(attitude), state[core.STATE_CURRENT]])
 
     def _chart_derivative(self, state: Samples) -> Samples:
         """Derivative of the chart by what acts, (8, 8)."""
         sizes = _LITTLE * self._robot.step_sizes()
-        sizes[: rigid_links.PHASE] *= min(1.0, float(np.exp(self._closeness(state))) / self._robot.length)
+        sizes[: core.STATE_PHASE] *= min(1.0, float(np.exp(self._closeness(state))) / self._robot.length)
         columns = []
-        for at in stiff_steps.ACTING:
+        for at in ACTING:
             ahead, behind = state.copy(), state.copy()
             ahead[at] += sizes[at]
             behind[at] -= sizes[at]

@@ -23,7 +23,7 @@ from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError, check_range
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.arguments import Options
@@ -86,9 +86,9 @@ class TurningField:
     @classmethod
     def of(cls, links: FreeRobot) -> TurningField | None:
         """The field of a robot's file; None for another drive."""
-        if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
+        if links.drive[core.DRIVE_KIND] != core.MAGNETIC:
             return None
-        return cls(float(links.drive[rigid_links.FIELD_RATE]), float(links.drive[rigid_links.FIELD]))
+        return cls(float(links.drive[core.DRIVE_FIELD_RATE]), float(links.drive[core.DRIVE_FIELD]))
 
     @property
     def axis(self) -> Samples:
@@ -105,9 +105,9 @@ class TurningField:
     def on(self, links: _A) -> _A:
         """A robot in this field."""
         drive = links.drive.copy()
-        drive[rigid_links.FIELD_RATE], drive[rigid_links.FIELD] = self.rotation_rate, self.strength
-        drive[rigid_links.AXIS_Y : rigid_links.FIELD_PHASE] = self.axis[1:]
-        drive[rigid_links.FIELD_PHASE] = self.phase
+        drive[core.DRIVE_FIELD_RATE], drive[core.DRIVE_FIELD] = self.rotation_rate, self.strength
+        drive[core.DRIVE_AXIS_Y : core.DRIVE_FIELD_PHASE] = self.axis[1:]
+        drive[core.DRIVE_FIELD_PHASE] = self.phase
         return replace(links, drive=drive)
 
 
@@ -236,7 +236,7 @@ def magnetic_sweep(
             progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, requested.size)
         pushed = Rotation.from_rotvec([0.0, 0.0, _TILT]) * Rotation.from_quat(attitude, scalar_first=True)
         mean, still = _settled(links, float(rate), pushed.as_quat(scalar_first=True), turns)
-        attitude = mean.state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] if mean.follows else level
+        attitude = mean.state[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4] if mean.follows else level
         found.append(mean)
         settled.append(still)
         moving = np.array([mean.forward_velocity]), np.array([mean.tail_rotation_rate])
@@ -314,10 +314,10 @@ def _check_work(rates: Samples, turns: float, step_out: float) -> None:
 def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:
     """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
     drive = links.drive.copy()
-    drive[rigid_links.FIELD_RATE] = rate
+    drive[core.DRIVE_FIELD_RATE] = rate
     here = replace(links, drive=drive)
-    start: Samples = np.zeros(rigid_links.STATES)
-    start[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = attitude
+    start: Samples = np.zeros(core.STATE_SIZE)
+    start[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4] = attitude
     whole = float(max(round(turns), 1))  # so that every stretch begins with the field pointing up
     time = np.linspace(0.0, whole * 2.0 * np.pi / abs(rate), int(whole * _SAMPLES) + 1)
     before = None
@@ -338,9 +338,9 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
 def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
     from scipy.spatial.transform import Rotation
 
-    attitudes = Rotation.from_quat(states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4], scalar_first=True)
+    attitudes = Rotation.from_quat(states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4], scalar_first=True)
     rotation = np.asarray(attitudes.as_matrix())
-    moment = rotation @ links.drive[rigid_links.MOMENT : rigid_links.FIELD]
+    moment = rotation @ links.drive[core.DRIVE_MOMENT : core.DRIVE_FIELD]
     behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     slipped = behind - behind[0]
     follows = abs(float(slipped[-1])) < 0.5 * np.pi

@@ -30,8 +30,7 @@ from spirillum.fitted.fit import read_fit
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import contacts, rigid_links
-from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.quantities import in_units
 from spirillum.robot.placement import Placement
@@ -114,7 +113,7 @@ class Settling(DisplayMixin):
     @property
     def weight(self) -> float:
         """Submerged weight that acts, N; negative for a robot that floats."""
-        return float(self._free.robot.weight[: rigid_links.MOMENT_BODY].sum())
+        return float(self._free.robot.weight[: core.WEIGHT_MOMENT_BODY].sum())
 
     @property
     def weight_uncertainty(self) -> float | None:
@@ -130,7 +129,7 @@ class Settling(DisplayMixin):
     @property
     def friction_coefficient(self) -> float:
         """Coefficient of dry friction."""
-        return float(self._free.robot.tube[kernel.COEFFICIENT])
+        return float(self._free.robot.tube[core.TUBE_COEFFICIENT])
 
     def way(self, name: str) -> Samples:
         """The time, gap, azimuth, pitch, yaw, contact_force, x or roll at every step of the run."""
@@ -157,10 +156,10 @@ class Settling(DisplayMixin):
     def lubrication_ratios(self) -> Samples:
         """Resistance to sinking over that of the straight side in a thin film; NaN for a body without one."""
         robot = self._free.robot
-        body = robot.sites[robot.sites[:, contacts.SITE_ROTOR] == 0]
-        length = float(np.ptp(body[:, contacts.SITE_X]))
+        body = robot.sites[robot.sites[:, core.SITE_ROTOR] == 0]
+        length = float(np.ptp(body[:, core.SITE_X]))
         a, viscosity = 0.5 * self.robot.body.diameter, self.robot.fluid.viscosity
-        radius = float(robot.tube[kernel.RADIUS])
+        radius = float(robot.tube[core.TUBE_RADIUS])
         thin = [lubrication_resistance(viscosity, length, a, radius, film.gap) for film in self.films]
         return np.array([f.normal_resistance for f in self.films]) / thin if length > 0 else np.full(len(thin), np.nan)
 
@@ -260,7 +259,7 @@ def settle(
 def _films(free: FreeMotion, first: float, last: float) -> tuple[LubricationFilm, ...]:
     """The film at gaps of the trajectory, where the model `tube` resolves it."""
     motion, robot = free.prediction, free.robot
-    radius = float(robot.tube[kernel.RADIUS])
+    radius = float(robot.tube[core.TUBE_RADIUS])
     table = find_table(RobotGeometry.of(motion.batch), radius, "yaw")
     found: list[LubricationFilm] = []
     if table is None:

@@ -24,7 +24,7 @@ from spirillum.fitted.fit import FITTED_HELD, NO_FIT, Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.library import TabledTube
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -222,7 +222,7 @@ def _free_run(
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
     notes = [*steady.warnings, *([Note.named("film-alone")] if steady.robot.channel is not None else [])]
     notes += [*([NO_WEIGHT] if weight and not links.weight.any() else []), *unused]
-    more = {"wall_gap": run.observed[:, rigid_links.FILM] + links.roughness} if links.is_walled else {}
+    more = {"wall_gap": run.observed[:, core.SEEN_FILM] + links.roughness} if links.is_walled else {}
     attrs = free_attributes(steady, links, run, reach, title, notes)
     dataset = dataset_of(steady, links, run, switches, more, attrs)
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)

@@ -10,8 +10,7 @@ from spirillum.dynamics.integration import Reach, observed_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.fluid.tube.library import THINNEST_GAP
-from spirillum.kernels import rigid_links, tube_motion
-from spirillum.kernels import two_links as links_kernel
+from spirillum.kernels import core
 from spirillum.robot.geometry import Channel
 from spirillum.robot.links import outlines_of
 from spirillum.robot.placement import Placement
@@ -115,7 +114,7 @@ def links_without_walls(steady: Prediction, roughness: float | None, *, weight: 
 
 def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Samples:
     """The state of a robot at rest at its initial pose, (19,); a heavy one without a given gap starts low."""
-    start = start_state(robot, placement, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
+    start = start_state(robot, placement, lying=float(links.weight[: core.WEIGHT_MOMENT_BODY].sum()) > 0)
     if not links.spots.size:
         return start
     film, rough = float(links.gaps(start)[0]), links.roughness
@@ -133,14 +132,14 @@ def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Sample
             "smaller pitch, or a larger placement.gap"
         )
     raise InputError(
-        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[links_kernel.RADIUS], 'mm')}; "
+        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[core.WALL_RADIUS], 'mm')}; "
         "allowed: a larger placement.gap or a smaller placement.eccentricity"
     )
 
 
 def state_at_release(robot: Robot, links: TubeRobot, placed: Placement, azimuth: float = 0.0) -> Samples:
     """The state of a robot at rest at a pose, (19,)."""
-    radius, a, pitch = float(links.tube[tube_motion.RADIUS]), 0.5 * robot.body.diameter, placed.pitch or 0.0
+    radius, a, pitch = float(links.tube[core.TUBE_RADIUS]), 0.5 * robot.body.diameter, placed.pitch or 0.0
     if placed.eccentricity is not None:
         offset = placed.eccentricity * (radius - a)
     else:
@@ -184,7 +183,7 @@ def released_state(robot: Robot, links: TubeRobot, placed: Placement, azimuth: f
     state = state_at_release(robot, links, placed, azimuth)
     gap = float(links.gaps(state).min())
     check_roughness(links.roughness, gap, robot.body.diameter)
-    if observed_at(links, state)[rigid_links.OUTSIDE]:
+    if observed_at(links, state)[core.SEEN_OUTSIDE]:
         raise InputError(
             f"placement: a gap of {show(gap, 'mm')} with that pitch and yaw lies outside the robot's table; allowed: a "
             "pose nearer to level"
@@ -200,10 +199,10 @@ def state_at(offset: float, phase: float, pitch: float, yaw: float = 0.0, azimut
     """
     from scipy.spatial.transform import Rotation
 
-    state = np.zeros(rigid_links.STATES)
+    state = np.zeros(core.STATE_SIZE)
     turned = Rotation.from_euler("XZY", [azimuth, yaw, -pitch])
-    state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = turned.as_quat(scalar_first=True)
-    state[rigid_links.PHASE] = phase
-    state[rigid_links.POSITION + 1] = offset * np.sin(azimuth)
-    state[rigid_links.POSITION + 2] = -offset * np.cos(azimuth)
+    state[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4] = turned.as_quat(scalar_first=True)
+    state[core.STATE_PHASE] = phase
+    state[core.STATE_POSITION + 1] = offset * np.sin(azimuth)
+    state[core.STATE_POSITION + 2] = -offset * np.cos(azimuth)
     return state

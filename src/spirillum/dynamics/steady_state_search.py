@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.swimming.released_motion import State, SteadyState
 
 _MOST_TURNS = 300
@@ -45,7 +45,7 @@ class Path:
         azimuth = _PLACES["azimuth"]
         steps[:, azimuth] = np.unwrap(steps[:, azimuth])
         self._end = (0.0 if not self.steps else self._end) + np.array(
-            [turn.time, turn.state[rigid_links.POSITION], turn.state[rigid_links.ROLL]]
+            [turn.time, turn.state[core.STATE_POSITION], turn.state[core.STATE_ROLL]]
         )
         self.steps.append(steps)
 

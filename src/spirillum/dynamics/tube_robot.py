@@ -16,7 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import ROUGHNESS_SHARE, FreeRobot, drive_of, friction_of, torque_scale, weight_of
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film_surface import FilmBody
-from spirillum.kernels import contacts, rigid_links, tube_table
+from spirillum.kernels import core
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.outline import profile_outline
@@ -37,7 +37,7 @@ _LINE_STATIONS_PER_TURN = 64
 class Surroundings:
     """What surrounds a robot in its tube."""
 
-    ends: float = kernel.CLOSED
+    ends: float = core.CLOSED
     """`kernel.CLOSED`, `kernel.OPEN` or `kernel.IMPOSED`."""
     length: float = np.inf
     """L_eff of open ends, m."""
@@ -57,16 +57,16 @@ class TubeRobot(FreeRobot):
     """Trajectory and pose of a minute in contact are then accurate to some parts in 1e7, energies to 1e-6; a tenth of
     it takes two and a half times as long.
     """
-    observed: ClassVar[int] = rigid_links.SEEN
+    observed: ClassVar[int] = core.SEEN_SIZE
 
     tube: Samples
     """The tube (9,), see `kernels.tube_motion`."""
     wire: Samples
-    """The wire (6,), see `kernels.contacts`."""
+    """The wire, `Wire` of csrc/contacts.h, (6,)."""
     sites: Samples
-    """Sites of body and coupling that can touch (n, 5), see `kernels.contacts`."""
+    """Sites of body and coupling that can touch, `Site`, (n, 5)."""
     stations: Samples
-    """Stations along the wires (m, 8), see `kernels.contacts`."""
+    """Stations along the wires, `Station`, (m, 8)."""
     flow: Samples
     """Imposed mean flow (k, 2)."""
     names: tuple[str, ...]
@@ -92,7 +92,7 @@ class TubeRobot(FreeRobot):
     @property
     def roughness(self) -> float:
         """Height of the asperities, m."""
-        return float(self.tube[kernel.ROUGHNESS])
+        return float(self.tube[core.TUBE_ROUGHNESS])
 
     def between(self, start: float, stop: float) -> TubeRobot:
         """The robot with what of the imposed flow matters from one time to another: few rows are copied."""
@@ -106,15 +106,15 @@ class TubeRobot(FreeRobot):
     def range_left(self, state: Samples, time: float) -> str:
         """A sentence on the range of the table that was left."""
         seen = self.observe(np.array([time]), state[None])[0]
-        name = _RANGES.get(int(seen[rigid_links.OUTSIDE]), "place")
-        offset, pitch, yaw = seen[[kernel.OFFSET, kernel.WALL_PITCH, kernel.WALL_YAW]]
+        name = _RANGES.get(int(seen[core.SEEN_OUTSIDE]), "place")
+        offset, pitch, yaw = seen[[core.SEEN_OFFSET, core.SEEN_PITCH, core.SEEN_YAW]]
         return (
             f"{kernel.RANGE_LEFT} in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
             f"{np.degrees(pitch):.3g} deg and a yaw of {np.degrees(yaw):.3g} deg against the wall"
         )
 
 
-_RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
+_RANGES = {core.TOO_FAR_PITCHED: "pitch", core.TOO_FAR_YAWED: "yaw"}
 """How `resistance_at` reports that a pose is outside the table."""
 
 
@@ -123,19 +123,19 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     robot, effective = steady.robot, steady.effective_friction
     if robot.channel is None:
         raise InputError("the robot has no channel; allowed: a robot with a [channel]")
-    heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(steady.batch)
+    heavy, drive = weight_of(robot) if weight else np.zeros(core.WEIGHT_SIZE), drive_of(steady.batch)
     a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
     drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])
     torque = torque_scale(drag, heavy, drive)
-    tube = np.zeros(kernel.TUBE - 2)
-    tube[kernel.RADIUS] = 0.5 * robot.channel.diameter
-    tube[kernel.ROUGHNESS] = ROUGHNESS_SHARE * a if around.roughness is None else around.roughness
-    tube[kernel.LOAD] = torque / half  # its weight, or what its drive presses a lighter one with
-    tube[kernel.COEFFICIENT], tube[kernel.SLIDING] = around.coefficient, _SLIDING_SHARE * a * 2.0 * np.pi / turn
-    tube[kernel.VISCOSITY] = robot.fluid.viscosity
-    tube[kernel.ENDS], tube[kernel.LENGTH] = around.ends, around.length
+    tube = np.zeros(core.TUBE_SIZE - 2)
+    tube[core.TUBE_RADIUS] = 0.5 * robot.channel.diameter
+    tube[core.TUBE_ROUGHNESS] = ROUGHNESS_SHARE * a if around.roughness is None else around.roughness
+    tube[core.TUBE_LOAD] = torque / half  # its weight, or what its drive presses a lighter one with
+    tube[core.TUBE_COEFFICIENT], tube[core.TUBE_SLIDING] = around.coefficient, _SLIDING_SHARE * a * 2.0 * np.pi / turn
+    tube[core.TUBE_VISCOSITY] = robot.fluid.viscosity
+    tube[core.TUBE_ENDS], tube[core.TUBE_LENGTH] = around.ends, around.length
     bound = robot.fluid.cavitation_pressure
-    tube[kernel.CAVITATION] = np.inf if bound is None else bound
+    tube[core.TUBE_CAVITATION] = np.inf if bound is None else bound
     names, sites = _sites(robot)
     form = robot.tail.form
     xi = _station_positions(robot)
@@ -146,11 +146,11 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
         for turn, turned in zip(form.turns, form.rotations, strict=True)
     ]
     tail = robot.tail
-    found = np.zeros(contacts.WIRE)
-    found[contacts.WIRE_RADIUS], found[contacts.AMPLITUDE] = 0.5 * tail.wire_diameter, tail.amplitude
-    found[contacts.TAPER] = 0.0 if tail.taper is None else tail.taper / tail.length
-    found[contacts.HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength if tail.form.is_helix else 0.0
-    found[contacts.ROOT], found[contacts.LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
+    found = np.zeros(core.WIRE_SIZE)
+    found[core.WIRE_RADIUS], found[core.WIRE_AMPLITUDE] = 0.5 * tail.wire_diameter, tail.amplitude
+    found[core.WIRE_TAPER] = 0.0 if tail.taper is None else tail.taper / tail.length
+    found[core.WIRE_HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength if tail.form.is_helix else 0.0
+    found[core.WIRE_ROOT], found[core.WIRE_LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
     return TubeRobot(
         friction=friction_of(steady.batch, steady.friction, 0.0 if np.isnan(effective) else effective),
         weight=heavy,

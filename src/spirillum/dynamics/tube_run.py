@@ -23,7 +23,7 @@ from spirillum.dynamics.start import reach_of
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
-from spirillum.kernels import rigid_links
+from spirillum.kernels import core
 from spirillum.kernels import tube_motion as kernel
 from spirillum.notes import Note
 from spirillum.swimming.prediction import Prediction
@@ -31,7 +31,7 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-ENDS = {kernel.CLOSED: "closed", kernel.OPEN: "open", kernel.IMPOSED: "imposed flow"}
+ENDS = {core.CLOSED: "closed", core.OPEN: "open", core.IMPOSED: "imposed flow"}
 """Ends of the channel in words."""
 
 _FEWEST = 2
@@ -91,9 +91,9 @@ def tube_run(
     ordered = sorted((*before, *run.events), key=lambda event: event.time)
     attrs |= {
         "roughness": robot.roughness,
-        "friction_coefficient": float(robot.tube[kernel.COEFFICIENT]),
-        "sliding_speed": float(robot.tube[kernel.SLIDING]),
-        "ends": ENDS[float(robot.tube[kernel.ENDS])],
+        "friction_coefficient": float(robot.tube[core.TUBE_COEFFICIENT]),
+        "sliding_speed": float(robot.tube[core.TUBE_SLIDING]),
+        "ends": ENDS[int(robot.tube[core.TUBE_ENDS])],
         "wait": wait,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in ordered]),
     }
@@ -124,8 +124,8 @@ def _waited(
             f"wait = {wait:g} s: {run.events[-1].what} after {wait + run.time[-1]:.4g} s; allowed: a shorter time"
         )
     found = run.states[-1].copy()
-    found[rigid_links.POSITION], found[rigid_links.ROLL] = state[rigid_links.POSITION], 0.0
-    found[rigid_links.CURRENT : rigid_links.STATES] = 0.0
+    found[core.STATE_POSITION], found[core.STATE_ROLL] = state[core.STATE_POSITION], 0.0
+    found[core.STATE_CURRENT : core.STATE_SIZE] = 0.0
     return found, tuple(event for event in run.events if not event.what.startswith("duty"))
 
 
@@ -137,9 +137,9 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
         time, step, state = float(found.time), float(found.step), np.array([float(value) for value in found.state])
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"the run has no checkpoint; {allowed}") from error
-    if len(state) != rigid_links.STATES:
-        raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {rigid_links.STATES}")
-    quaternion = state[rigid_links.ATTITUDE : rigid_links.PHASE]
+    if len(state) != core.STATE_SIZE:
+        raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {core.STATE_SIZE}")
+    quaternion = state[core.STATE_ATTITUDE : core.STATE_PHASE]
     sound = np.isfinite([time, step, *state]).all() and abs(float(np.linalg.norm(quaternion)) - 1.0) < _UNIT
     within = 0.0 <= time <= float(dataset["time"][-1]) and step > 0.0 and np.abs(state).max() <= _MOST
     if not sound or not within or not _near(dataset, time, state):
@@ -152,29 +152,29 @@ def _near(dataset: xr.Dataset, time: float, state: Samples) -> bool:
     positions, times = numbers_of(dataset, "position", ("axis",), (3,)), numbers_of(dataset, "time")
     there = np.array([np.interp(time, times, along) for along in positions.T])
     way = np.ptp(positions, axis=0) + _ASIDE
-    return bool(np.all(np.abs(state[rigid_links.POSITION : rigid_links.POSITION + 3] - there) <= way))
+    return bool(np.all(np.abs(state[core.STATE_POSITION : core.STATE_POSITION + 3] - there) <= way))
 
 
 def series_in_tube(run: Trajectory) -> dict[str, Samples]:
     """What a run in a tube has beside that of any free run, by name, each (n,); SI."""
     seen, states = run.observed, run.states
-    tail = seen[:, rigid_links.TAIL_GAP]
+    tail = seen[:, core.SEEN_TAIL_GAP]
     return {
-        "offset": seen[:, kernel.OFFSET],
-        "azimuth": np.unwrap(seen[:, kernel.AZIMUTH]),
-        "wall_pitch": seen[:, kernel.WALL_PITCH],
-        "wall_yaw": seen[:, kernel.WALL_YAW],
-        "wall_gap": seen[:, rigid_links.FILM],
+        "offset": seen[:, core.SEEN_OFFSET],
+        "azimuth": np.unwrap(seen[:, core.SEEN_AZIMUTH]),
+        "wall_pitch": seen[:, core.SEEN_PITCH],
+        "wall_yaw": seen[:, core.SEEN_YAW],
+        "wall_gap": seen[:, core.SEEN_FILM],
         "tail_gap": np.where(np.isfinite(tail), tail, np.nan),
-        "contact_force": seen[:, kernel.CONTACT_FORCE],
-        "contact_friction": seen[:, kernel.CONTACT_FRICTION],
-        "weight_load": seen[:, kernel.WEIGHT_LOAD],
-        "film_load": seen[:, kernel.FILM_LOAD],
-        "outer_load": seen[:, kernel.OUTER_LOAD],
-        "contact_load": seen[:, kernel.CONTACT_LOAD],
-        "lift": seen[:, kernel.LIFT],
-        "contact_power": seen[:, kernel.CONTACT_POWER],
-        "contact_energy": states[:, rigid_links.CONTACT],
-        "mean_flow": seen[:, kernel.MEAN_FLOW],
-        "flow_energy": states[:, rigid_links.FLOW],
+        "contact_force": seen[:, core.SEEN_CONTACT_FORCE],
+        "contact_friction": seen[:, core.SEEN_CONTACT_FRICTION],
+        "weight_load": seen[:, core.SEEN_WEIGHT_LOAD],
+        "film_load": seen[:, core.SEEN_FILM_LOAD],
+        "outer_load": seen[:, core.SEEN_OUTER_LOAD],
+        "contact_load": seen[:, core.SEEN_CONTACT_LOAD],
+        "lift": seen[:, core.SEEN_LIFT],
+        "contact_power": seen[:, core.SEEN_CONTACT_POWER],
+        "contact_energy": states[:, core.STATE_CONTACT],
+        "mean_flow": seen[:, core.SEEN_MEAN_FLOW],
+        "flow_energy": states[:, core.STATE_FLOW],
     }

@@ -22,9 +22,9 @@ from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import BELOW, TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
-from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.core import largest_yaw, resistance_at
-from spirillum.kernels.tube_table import MOTIONS, range_of
+from spirillum.kernels import core
+from spirillum.kernels.core import MOTIONS, largest_yaw, resistance_at
+from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -66,13 +66,13 @@ def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
     flow = float(np.interp(end, *links.flow.T))
     weight = weight_words(links)
     pairs: dict[str, tuple[str | float, str | float]] = {
-        "ends": (str(before.attrs.get("ends", "")), ENDS[float(links.tube[kernel.ENDS])]),
+        "ends": (str(before.attrs.get("ends", "")), ENDS[int(links.tube[core.TUBE_ENDS])]),
         "friction": (str(before.attrs.get("friction", "")), steady.friction),
         "weight": (str(before.attrs.get("weight", weight)), weight),
         "roughness": (_number(before, "roughness"), links.roughness),
-        "friction coefficient": (_number(before, "friction_coefficient"), float(links.tube[kernel.COEFFICIENT])),
+        "friction coefficient": (_number(before, "friction_coefficient"), float(links.tube[core.TUBE_COEFFICIENT])),
     }
-    if pairs["ends"] == (ENDS[kernel.IMPOSED],) * 2:
+    if pairs["ends"] == (ENDS[core.IMPOSED],) * 2:
         pairs["mean flow at its end"] = (float(numbers_of(before, "mean_flow")[-1]), flow)
     for what, (then, now) in pairs.items():
         if not _alike(then, now):
@@ -183,7 +183,7 @@ def run_in_tube(
     notes += stuck or (checked.notes if np.isfinite(error) else [])
     return dataset.assign_attrs(
         **note_attributes(notes),
-        state=end_state(dataset, notes, float(links.tube[kernel.SLIDING])),
+        state=end_state(dataset, notes, float(links.tube[core.TUBE_SLIDING])),
         error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
@@ -248,15 +248,15 @@ def _around(robot: Robot, placed: Placement, options: InTube, roughness: float |
             f"in_tube.flow = {str(options.flow)[:80]} excludes placement.flow and placement.ends; allowed: one of the "
             "three"
         )
-    ends = kernel.IMPOSED
+    ends = core.IMPOSED
     flow: Samples = np.zeros((1, 2))
     if options.flow is not None:
         flow = read_flow(options.flow)
     elif placed.flow is not None:
         flow = np.array([[0.0, placed.flow]])
     else:
-        ends = kernel.OPEN if placed.ends_of(length) == "open" else kernel.CLOSED
-    if ends == kernel.OPEN and not np.isfinite(length):
+        ends = core.OPEN if placed.ends_of(length) == "open" else core.CLOSED
+    if ends == core.OPEN and not np.isfinite(length):
         raise InputError("placement.ends = 'open' needs channel.length; allowed: closed ends, or a channel.length")
     return Surroundings(
         ends=ends,
@@ -311,10 +311,10 @@ def compare_with_check(
 
 def sticking_notes(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
     """A sentence on a body that slides more slowly than dry friction is resolved; none on any other."""
-    smoothed = float(robot.tube[kernel.SLIDING])
+    smoothed = float(robot.tube[core.TUBE_SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
         return []
-    coefficient = float(robot.tube[kernel.COEFFICIENT])
+    coefficient = float(robot.tube[core.TUBE_COEFFICIENT])
     return [Note.named("held-by-friction", coefficient=coefficient, speed=show(smoothed, "um/s"))]
 
 

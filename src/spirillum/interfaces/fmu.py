@@ -29,8 +29,8 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
 from spirillum.formats.templates import rendered
-from spirillum.kernels import rigid_links, stiff_steps
-from spirillum.kernels.motor import STATES as AXIAL_STATES
+from spirillum.kernels import core
+from spirillum.kernels.core import AXIAL_STATE_SIZE as AXIAL_STATES
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.prediction import Prediction
 from spirillum.version import own_version
@@ -174,9 +174,9 @@ def free_model(plant: Plant) -> FmuModel:
     ]
     electrical = _ELECTRICAL if plant.steady.batch.drive == "dc-motor" else ()
     names += [_output(name) for name in (*_FREE, *electrical)]
-    data, gaps = links.data, links.gap_count + stiff_steps.WATCHED
-    state = stiff_steps.MEMORY + 10 * rigid_links.STATES + gaps + 4 + data.size
-    drive = rigid_links.SEEN + links.friction.size + links.weight.size
+    data, gaps = links.data, links.gap_count + core.WATCHED
+    state = core.MEMORY_SIZE + 10 * core.STATE_SIZE + gaps + 4 + data.size
+    drive = core.SEEN_SIZE + links.friction.size + links.weight.size
     return FmuModel(
         prediction=plant.steady,
         motion="released in its channel",
@@ -193,7 +193,7 @@ def free_model(plant: Plant) -> FmuModel:
             "GAPS": str(links.gap_count),
             "DATA_SIZE": str(data.size),
             "TABLE_SIZE": str(links.table.size),
-            "DUTY_PLACE": str(drive + rigid_links.DUTY),
+            "DUTY_PLACE": str(drive + core.DRIVE_DUTY),
             "ROUGHNESS": _number(links.roughness),
             "TOLERANCE": _number(links.tolerance),
             "FIRST_STEP": _number(first_step(links)),

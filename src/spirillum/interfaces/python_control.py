@@ -15,7 +15,7 @@ from spirillum.display import DisplayMixin
 from spirillum.dynamics.axial_robot import INPUTS, STATES, AxialRobot, axial_robot, motion, outputs, rates, slopes
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
-from spirillum.kernels import motor as kernel
+from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of
@@ -194,7 +194,7 @@ def _slopes_on_curve(axial: AxialRobot, duty: float, flow: float) -> tuple[Sampl
     p, torque = axial.numbers, axial.steady_current(axial.numbers, duty, flow)
     per_torque, per_flow = motion(p, 1.0, 0.0), motion(p, 0.0, 1.0)
     _, tail, body = per_torque * torque + per_flow * flow
-    sense, curve = p[kernel.POLARITY], axial.prediction.batch.curve
+    sense, curve = p[core.AXIAL_POLARITY], axial.prediction.batch.curve
     assert curve is not None  # noqa: S101 - of such a motor alone
     rate, rates, torques = sense * (tail - body), np.array(curve.rates), np.array(curve.torques)
     piece = int(np.clip(np.searchsorted(rates, rate) - 1, 0, rates.size - 2))

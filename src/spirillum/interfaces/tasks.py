@@ -18,7 +18,7 @@ from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.dynamics.axial_batch import AxialBatch
 from spirillum.errors import InputError
-from spirillum.kernels import motor as kernel
+from spirillum.kernels import core
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -136,7 +136,7 @@ class TaskEnvironment(ABC):
     @property
     def position(self) -> Samples:
         """True positions, m."""
-        return self.plants.states[:, kernel.POSITION]
+        return self.plants.states[:, core.AXIAL_STATE_POSITION]
 
     @property
     def speed(self) -> Samples:
@@ -277,7 +277,7 @@ class HoldSpeed(TaskEnvironment):
 
     def _observation(self, rng: np.random.Generator) -> list[Samples]:
         noise = self.lab.meter.current_noise * rng.standard_normal(self.count)
-        current = self._gain * np.abs(self.plants.states[:, kernel.CURRENT]) + noise
+        current = self._gain * np.abs(self.plants.states[:, core.AXIAL_STATE_CURRENT]) + noise
         return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._sent, self._time_left()]
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.core import contact_offset_of, largest_yaw, stretched_yaw
+from spirillum.kernels.core import MOTIONS, contact_offset_of, largest_yaw, stretched_yaw
 
 # Columns of the head of a packed table.
 TUBE, BODY, HALF = 0, 1, 2  # R, a and a spheroid's half-length (0: a straight side), m
@@ -59,13 +59,10 @@ def film_is_whole(film: Samples, radius: float) -> bool:
     return values.size - math.prod(shape_of(film)) in (0, 1) and bool(np.isfinite(values).all())
 
 
-MOTIONS = 8
-"""U and Omega of the body, omega_m of the rotor against it, and the mean flow."""
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
-"""Sign of each motion in a mirror to the side."""
+"""Sign of each of the `MOTIONS` (U and Omega of the body, omega_m of the rotor, mean flow) in a mirror to the side."""
 PARAMETERS = MOTIONS * (MOTIONS + 1) // 2
 """Entries of a Cholesky factor."""
-INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED = 0, 1, 2
 STEEPEST = (math.radians(12.0), math.radians(8.0))
 """Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
 YAW_SLACK = 1.1  # of the largest yaw: the tail touches the glass a little beyond it

@@ -11,8 +11,7 @@ from pydantic import model_validator
 
 from spirillum.data_tables import rows_of
 from spirillum.files import MARK
-from spirillum.kernels.core import windings
-from spirillum.kernels.motor import CONSTANT, MOTOR, SLOPE
+from spirillum.kernels.core import AXIAL_CONSTANT, AXIAL_SLOPE, MOTOR_SIZE, windings
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import default_of, field_values, refuse
 from spirillum.robot.limits import assembly_limits, broken
@@ -37,8 +36,15 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
     It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
     """
     current = np.linspace(0.0, 1.1 * battery.voltage / max(battery.internal_resistance, 1e-3 * battery.voltage), 4001)
-    r, motors, found = motor.resistance, np.zeros((current.size, MOTOR)), np.empty((current.size, 2))
-    motors[:, CONSTANT : SLOPE + 1] = r.constant, r.decay, r.decay_rate, r.growth, r.growth_rate, r.slope
+    r, motors, found = motor.resistance, np.zeros((current.size, MOTOR_SIZE)), np.empty((current.size, 2))
+    motors[:, AXIAL_CONSTANT : AXIAL_SLOPE + 1] = (
+        r.constant,
+        r.decay,
+        r.decay_rate,
+        r.growth,
+        r.growth_rate,
+        r.slope,
+    )
     windings(motors, current, found)
     resistance = found[:, 0]
     with np.errstate(over="ignore"):

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from spirillum.errors import InputError
-from spirillum.kernels.motor import MOST_POINTS
+from spirillum.kernels.core import MOST_POINTS
 from spirillum.notes import Note
 from spirillum.robot.fields import (
     NONE,

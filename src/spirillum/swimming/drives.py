@@ -13,8 +13,7 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Samples, Values
 from spirillum.errors import InputError
-from spirillum.kernels.core import curve_torques, steady_currents, windings
-from spirillum.kernels.motor import MOST_POINTS, MOTOR
+from spirillum.kernels.core import MOST_POINTS, MOTOR_SIZE, curve_torques, steady_currents, windings
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.tables import FrictionReading, TorqueCurve
 from spirillum.swimming.balance import (
@@ -32,7 +31,7 @@ def winding_resistance(motor: Electrics, current: Values) -> Values:
     """R(I) of Table II, ohm; takes |I|."""
     rows, shape = _rows(motor, current)
     found = np.empty((rows.shape[0], 2))
-    windings(np.ascontiguousarray(rows[:, :MOTOR]), np.ascontiguousarray(rows[:, MOTOR]), found)
+    windings(np.ascontiguousarray(rows[:, :MOTOR_SIZE]), np.ascontiguousarray(rows[:, MOTOR_SIZE]), found)
     return found[:, 0].reshape(shape)
 
 

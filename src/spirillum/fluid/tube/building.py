@@ -48,8 +48,7 @@ from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core
 from spirillum.kernels import tube_table as kernel
-from spirillum.kernels.core import film_at
-from spirillum.kernels.tube_table import MOTIONS
+from spirillum.kernels.core import MOTIONS, film_at
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import TubePose
 
@@ -390,7 +389,7 @@ def _largest_errors(
     errors = []
     for check, answers in zip(checks, solved, strict=True):
         (_, phases), pose = check.tails[0], check.pose
-        found = np.empty((len(phases) + PHASES, kernel.MOTIONS, kernel.MOTIONS))
+        found = np.empty((len(phases) + PHASES, core.MOTIONS, core.MOTIONS))
         for phase, out in zip((*phases, *even_phases()), found, strict=True):
             core.resistance_at(table, pose.offset, pose.pitch, pose.yaw, phase, out)
         turn = found[len(phases) :]

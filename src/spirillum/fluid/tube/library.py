@@ -28,8 +28,8 @@ from spirillum.fluid.tube.table import BELOW, TubeTable, key_of, least_checked_g
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
-from spirillum.kernels.core import largest_yaw, mean_resistance_at, mean_resistances
-from spirillum.kernels.tube_table import INSIDE, MOTIONS, PHASES
+from spirillum.kernels.core import INSIDE, MOTIONS, largest_yaw, mean_resistance_at, mean_resistances
+from spirillum.kernels.tube_table import PHASES
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 

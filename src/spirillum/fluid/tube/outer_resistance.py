@@ -16,9 +16,9 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.solids import MOTIONS, Fineness
 from spirillum.fluid.tube.tube import is_solved, solved_together
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.core import MOTIONS as RATES
 from spirillum.kernels.core import cut_of_film
 from spirillum.kernels.tube_table import MIRROR
-from spirillum.kernels.tube_table import MOTIONS as RATES
 from spirillum.robot.tube_pose import TubePose
 from spirillum.units import show
 from spirillum.worker_pool import imap_unordered

@@ -145,7 +145,7 @@ def _coded(values: Samples) -> bytes:
 
 def _rows_of(rest: Samples) -> Samples:
     """Size of each row of the factor, (8,): the geometric mean of its diagonal."""
-    row, column = np.tril_indices(tube_table.MOTIONS)
+    row, column = np.tril_indices(core.MOTIONS)
     found: Samples = np.exp(np.mean(rest[:, :, 0][..., row == column], axis=(0, 1)))
     return found
 
@@ -158,7 +158,7 @@ def _times(matrix: Samples, yawed: Samples) -> Samples:
 
 def _steps(rows: Samples) -> Samples:
     """Steps of the rest and of what a yaw adds to it at its nodes, (36,)."""
-    row, column = np.tril_indices(tube_table.MOTIONS)
+    row, column = np.tril_indices(core.MOTIONS)
     found: Samples = _REST * np.where(row == column, 1.0, rows[row])
     return found
 
@@ -216,7 +216,7 @@ class TubeTable:
             yaw: nose to the side, rad.
             phase: of the tail, rad.
         """
-        out = np.empty((tube_table.MOTIONS, tube_table.MOTIONS))
+        out = np.empty((core.MOTIONS, core.MOTIONS))
         left = core.resistance_at(self.packed, offset, pitch, yaw, phase, out)
         return out, int(left)
 

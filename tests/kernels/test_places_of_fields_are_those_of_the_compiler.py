@@ -1,0 +1,45 @@
+"""Python's constants, which are read from the headers, are what the compiler makes of these."""
+
+import re
+import runpy
+import subprocess
+from pathlib import Path
+
+BUILD = runpy.run_path(str(Path(__file__).parents[2] / "csrc" / "build.py"))
+HEADERS = ("motion.h", "axial.h", "stiff_steps.h")
+STRUCTS = {
+    name: body
+    for path in BUILD["SOURCES"].glob("*.h")
+    for body, name in BUILD["_STRUCT"].findall(BUILD["_COMMENT"].sub("", path.read_text()))
+}
+
+
+def path_of(struct: str, field: str) -> str:
+    """A field as C names it, within the motor or the curve of a struct where it has them."""
+    if re.search(rf"\b{field}\b", STRUCTS[struct]):
+        return field
+    if re.search(rf"\b{field}\b", STRUCTS["Motor"]):
+        return f"motor.{field}"
+    return f"curve.at[0].{field}" if field in {"rate", "torque"} else f"curve.{field}"
+
+
+def test_places_of_fields_are_those_of_the_compiler(tmp_path: Path) -> None:
+    constants = BUILD["_constants"]()
+    assert constants["STATE_PHASE"] == 7
+    lines = ["#include <stddef.h>", *(f'#include "{name}"' for name in HEADERS)]
+    checked = 0
+    for struct in BUILD["_COLUMNS"]:
+        prefix = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", struct).upper() + "_"
+        for name, value in constants.items():
+            if not name.startswith(prefix) or (prefix == "AXIAL_" and name.startswith("AXIAL_STATE_")):
+                continue
+            field = name.removeprefix(prefix).lower()
+            place = f"sizeof({struct})" if field == "size" else f"offsetof({struct}, {path_of(struct, field)})"
+            lines.append(f'_Static_assert({place} == {value} * sizeof(double), "{name}");')
+            checked += 1
+    assert checked > 150
+    source = tmp_path / "places.c"
+    source.write_text("\n".join(lines))
+    command = [*BUILD["compiler"]().command, "-std=c11", "-fsyntax-only", "-I", str(BUILD["SOURCES"]), str(source)]
+    said = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert said.returncode == 0, said.stderr
