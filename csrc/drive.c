@@ -4,18 +4,21 @@
 static const double LARGEST_EXPONENT = 600.0; /* far currents are tried on the way to a root */
 static const double LARGEST_START = 1e6;      /* largest current at which the search for the steady one starts, A */
 
-double winding_resistance(const Motor *m, double current) {
-    const double size = fabs(current);
-    return winding(m->constant, m->decay, exp(-m->decay_rate * size), m->growth,
-                   exp(smaller(m->growth_rate * size, LARGEST_EXPONENT)), m->slope, size);
+/* R(|I|), ohm, and dR/d|I|, ohm/A. */
+typedef struct {
+    double resistance, slope;
+} Winding;
+
+static inline Winding winding_at(const Motor *m, double current) {
+    const double size = fabs(current), falling = exp(-m->decay_rate * size);
+    const double rising = exp(smaller(m->growth_rate * size, LARGEST_EXPONENT));
+    return (Winding){
+        .resistance = winding(m->constant, m->decay, falling, m->growth, rising, m->slope, size),
+        .slope = -m->decay * m->decay_rate * falling + m->growth * m->growth_rate * rising + m->slope,
+    };
 }
 
-/* dR/d|I|, ohm/A. */
-static double winding_slope(const Motor *m, double current) {
-    const double size = fabs(current);
-    return -m->decay * m->decay_rate * exp(-m->decay_rate * size)
-         + m->growth * m->growth_rate * exp(smaller(m->growth_rate * size, LARGEST_EXPONENT)) + m->slope;
-}
+double winding_resistance(const Motor *m, double current) { return winding_at(m, current).resistance; }
 
 /* dI/dt of (17), A/s, at a rate of the joint, all in one sense. */
 double current_rate(const Motor *m, double duty, double current, double rate) {
@@ -23,23 +26,21 @@ double current_rate(const Motor *m, double duty, double current, double rate) {
     return excess_voltage(supply, 0.0, winding_resistance(m, current), current, m->back_emf * rate) / m->inductance;
 }
 
-/* A motor under a load: back-emf without a current, V, and what a current adds to it, V/A. */
-typedef struct {
-    Motor motor;
-    double duty, back_emf, back_emf_per_current;
-} Loaded;
-
 /* What decides the size i of a steady current: voltage that it takes less the one that drives it. */
 typedef struct {
     const Motor *motor;
     double linear, drive;
 } Search;
 
-static double excess(const Search *s, double i) { return (winding_resistance(s->motor, i) + s->linear) * i - s->drive; }
+/* At a current: the former less the latter, V, and the next current of Newton's method. */
+typedef struct {
+    double excess, newton;
+} Trial;
 
-/* The next current of Newton's method. */
-static double newton_step(const Search *s, double i, double found) {
-    return i - found / (winding_resistance(s->motor, i) + s->linear + winding_slope(s->motor, i) * i);
+static inline Trial trial_at(const Search *s, double i) {
+    const Winding w = winding_at(s->motor, i);
+    const double excess = (w.resistance + s->linear) * i - s->drive;
+    return (Trial){excess, i - excess / (w.resistance + s->linear + w.slope * i)};
 }
 
 /* Newton steps kept inside a bracket: while the motor drives there is a single root (the robot file is checked for it). */
@@ -49,25 +50,23 @@ static double root_of(const Search *s) {
     /* A winding almost without resistance at rest would start beyond what 200 halvings come back from. */
     double i = smaller(s->drive / (at_rest > 0.0 ? at_rest : 1.0), LARGEST_START);
     double low = 0.0, high = 2.0 * i + 1e-12;
-    for (int n = 0; n < 60 && excess(s, high) < 0.0; n++) high *= 2.0;
-    if (!(excess(s, high) >= 0.0)) return NAN; /* driven too fast: V(|I|) falls faster than R(I) I rises */
+    Trial trial = trial_at(s, high);
+    for (int n = 0; n < 60 && trial.excess < 0.0; n++) trial = trial_at(s, high *= 2.0);
+    if (!(trial.excess >= 0.0)) return NAN; /* driven too fast: V(|I|) falls faster than R(I) I rises */
     double last = high - low;
+    trial = trial_at(s, i);
     for (int n = 0; n < 200; n++) {
-        const double f = excess(s, i), newton = newton_step(s, i, f);
-        if (f < 0.0)
-            low = i;
-        else
-            high = i;
+        *(trial.excess < 0.0 ? &low : &high) = i;
         /* Newton creeps along an exponential: a step that is not half the one before gives way to bisection. */
-        const bool good = newton >= low && newton <= high && fabs(newton - i) <= 0.5 * last;
-        const double next = good ? newton : 0.5 * (low + high);
+        const bool good = trial.newton >= low && trial.newton <= high && fabs(trial.newton - i) <= 0.5 * last;
+        const double next = good ? trial.newton : 0.5 * (low + high);
         last = fabs(next - i);
         i = next;
+        trial = trial_at(s, i);
         if (!(last > 1e-9 * fabs(i))) break;
     }
     /* Newton's error is the square of the step before; where rounding led out of the bracket, the last step halved it. */
-    const double newton = newton_step(s, i, excess(s, i));
-    return isfinite(newton) ? clamped(newton, low, high) : i;
+    return isfinite(trial.newton) ? clamped(trial.newton, low, high) : i;
 }
 
 /* Steady root of (17), A: R(I) I = d V(I) - (back-emf + back-emf per current I). Negative where the load drives the motor,
@@ -87,9 +86,9 @@ EXPORT void steady_currents(const double *cases /* (count, 15) */, double *out /
 EXPORT void windings(const double *motors /* (count, 12) */, const double *currents /* (count) */,
                      double *out /* (count, 2) */, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        const Motor *motor = (const Motor *)motors + n;
-        out[2 * n] = winding_resistance(motor, currents[n]);
-        out[2 * n + 1] = winding_slope(motor, currents[n]);
+        const Winding found = winding_at((const Motor *)motors + n, currents[n]);
+        out[2 * n] = found.resistance;
+        out[2 * n + 1] = found.slope;
     }
 }
 

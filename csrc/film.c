@@ -188,6 +188,7 @@ static void interpolate(const Film *f, const Coordinates *c, double out[FILM_ENT
         for (int j = 0; j < 4; j++) {
             const double weight = along[i] * across[j];
             const float *of_cell = f->coefficients + ((row + i) * columns + column + j) * count;
+#pragma omp simd
             for (int64_t k = 0; k < count; k++) sums[k] += weight * (double)of_cell[k];
         }
     }

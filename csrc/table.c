@@ -178,6 +178,7 @@ static void sum_terms(const Terms *terms, int64_t count, double *restrict out) {
         const double *restrict v0 = v[0], *restrict v1 = v[1], *restrict v2 = v[2], *restrict v3 = v[3];
         const double *restrict v4 = v[4], *restrict v5 = v[5];
         const double w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3], w4 = w[4], w5 = w[5];
+#pragma omp simd
         for (int64_t n = 0; n < count; n++)
             out[n] = out[n] + w0 * v0[n] + w1 * v1[n] + w2 * v2[n] + w3 * v3[n] + w4 * v4[n] + w5 * v5[n];
     }
