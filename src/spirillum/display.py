@@ -20,7 +20,6 @@ class QuantityRow(NamedTuple):
     low: str  #: Least value of its band or interval; empty without one.
     high: str
     unit: str  #: Unit of the three; empty for pure numbers.
-    si: str  #: The value in SI, where that is another unit.
 
 
 def rows_of(items: Mapping[str, Any], only: Iterable[str] | None = None) -> list[QuantityRow]:
@@ -45,9 +44,7 @@ def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, An
     if unit == "m/s" and item["value"]:
         shown = speed_unit(item["value"], known.get("tail_rotation_rate", {}).get("value"))
     value, low, high = ("" if item.get(key) is None else in_unit(item[key], unit, shown) for key in _ENDS)
-    plain = "" if shown == "1" else shown
-    si = "" if plain in ("", unit) else f"{item['value']:.6g} {unit}"
-    return QuantityRow(_LABELS.get(name, name.replace("_", " ")), value, low, high, plain, si)
+    return QuantityRow(_LABELS.get(name, name.replace("_", " ")), value, low, high, "" if shown == "1" else shown)
 
 
 _ENDS = ("value", "low", "high")
@@ -213,4 +210,4 @@ def _errors(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     known = ("known error", str(error["statement"]))
     if error["value"] is None:
         return [known]
-    return [("error estimate", f"{percent(error['value'])} of the forward velocity"), known]
+    return [("numerical error, no interval", f"{percent(error['value'])} of the forward velocity"), known]

@@ -9,8 +9,9 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli.renderer import progress_bar
+from spirillum.fluid.tube import progress_messages
 from spirillum.fluid.tube.outer_resistance import NodeSolution, _mixed
-from spirillum.fluid.tube.progress_messages import progress_message
+from spirillum.fluid.tube.progress_messages import progress_message, slowdown, time_now
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
@@ -88,26 +89,34 @@ def test_table_that_nobody_asked_for_is_announced(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, quiet: bool
 ) -> None:
     """A line on standard error, also where no progress bar is shown."""
-    monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0), raising=False)
+    monkeypatch.setattr(progress_messages, "slowdown", lambda _: 1.0)
     with progress_bar(quiet=quiet) as progress:
         progress(progress_message(60, 2, 0, (10.0, 17.0)), 0, 60)
         progress("poses of the table", 1, 60)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert " ".join(shown.err.split()).startswith(
-        "no table of this tube yet: it is computed once from 60 poses, in 5 to 8 min with 2 processes"
+        "no table of this tube yet: it is computed once from 60 poses, in 5 to 8 min on 2 free cores"
     )
 
 
 def test_what_an_interrupted_preparation_has_kept_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     """The time is that of the rest, and longer beside other work."""
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
-    monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0), raising=False)
+    monkeypatch.setattr(progress_messages, "slowdown", lambda _: 1.0)
     said = progress_message(60, 2, 48, (10.0, 17.0))
-    assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min with 2 processes" in said
-    monkeypatch.setattr("os.getloadavg", lambda: (4.0, 0.0, 0.0), raising=False)
+    assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min on 2 free cores" in said
+    monkeypatch.setattr(progress_messages, "slowdown", lambda _: 3.0)
     busy = progress_message(60, 2, 48, (10.0, 17.0))
-    assert busy.endswith("in 60 s to 5 min with 2 processes beside the other work of this machine")
+    assert busy.endswith("in 60 s to 2 min on 2 free cores, 3 to 5 min beside the other work of this machine")
+
+
+def test_the_slowdown_is_that_of_threads_that_share_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thread that has half of a core takes twice as long, and is told so."""
+    clock = iter([0.0, 0.0, 0.06, 0.06] * 9)
+    monkeypatch.setattr(progress_messages, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(progress_messages, "thread_time", iter([0.0, 0.03, 0.0, 0.06]).__next__)
+    assert slowdown(1) == pytest.approx(2.0)
+    assert time_now(20.0, 40.0) == "20 to 40 s on a free core"
 
 
 def test_the_time_left_does_not_jump_between_cheap_and_expensive_poses() -> None:

@@ -73,7 +73,7 @@ def test_first_line_says_that_no_steady_motion_was_reached(
     tables = run(*asked)
     first = tables.out.partition("\n")[0]
     assert first.startswith("no steady motion was reached: the motion still changes after 1.")
-    assert "error estimate" not in tables.out
+    assert "numerical error" not in tables.out
     assert "times this speed" not in tables.out
     answer = json.loads(run(*asked, "--json").out)
     assert answer["lying"]["statement"] == first

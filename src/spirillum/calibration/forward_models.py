@@ -243,7 +243,7 @@ def without_tables(
     return InputError(
         f"{experiment.source}: {need} of every robot, and {len(lacking)} of {len(experiment.robots)} have none "
         f"({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
-        f"{preparation_time(RobotBatch.of(first), stage)} on two cores{otherwise}"
+        f"{preparation_time(RobotBatch.of(first), stage)}{otherwise}"
     )
 
 

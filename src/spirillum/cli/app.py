@@ -26,6 +26,7 @@ from spirillum.cli.shared_options import (
     Settings,
     complete_auto_models,
     complete_resistance_models,
+    every_note,
 )
 from spirillum.cli.view_commands import film, flow, page, show
 
@@ -98,7 +99,10 @@ def predict(request: Request, *, plot: Path | None = None, all_of_it: All = Fals
             name: value for name, value in request.arguments.items() if name in ("duration", "roughness", "in_tube")
         }
         beside = other_tube(result, asked)
-        answer, _ = run_together(result.to_dict, lambda: None if beside is None else beside.trial)
+        compared = json or every_note.get()  # what the terminal says of other models on request only takes a solution
+        answer, _ = run_together(
+            lambda: result.to_dict(other_models=compared), lambda: None if beside is None else beside.trial
+        )
         published = published_beside(result, beside)
     if published:
         answer = {**answer, "published": published}

@@ -53,12 +53,19 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
     for block in blocks:
         if every or not isinstance(block, Detail):
             _print(console, block)
-    left = len(details) + len(notes) - len(cautions)
     if every:
         for note in notes:
             _print_note(console, note, f" [{note.code}]")
-    elif left:
-        _print(console, f"{counted(left, 'note')}: --notes")
+    elif details or len(notes) > len(cautions):
+        _print(console, _left_line(notes, cautions))
+
+
+def _left_line(notes: Sequence[Note], shown: Sequence[Note]) -> str:
+    """What an answer has beside the cautions that are shown: codes of other cautions, and how to read all."""
+    above = {note.code for note in shown}
+    others = dict.fromkeys(note.code for note in notes if note.severity == "caution" and note.code not in above)
+    also = f"{counted(len(others), 'more caution')} ({', '.join(others)}) and " if others else ""
+    return f"{also}notes: --notes"
 
 
 def _print_json(answer: Answer) -> None:
@@ -146,12 +153,12 @@ def answer_kept(answer: Callable[[], Answer], *, json: bool, **options: Any) -> 
 
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:
     """A sign of life while a model solves; its first run on a machine compiles for some seconds."""
-    # That a pitched or yawed place is solved for, which takes minutes, is a line on standard error in any case.
+    # That a pitched or yawed place is solved for is a line on standard error in any case.
     from spirillum.fluid.registry import MODELS
-    from spirillum.fluid.tube.progress_messages import TILTED
+    from spirillum.fluid.tube.progress_messages import TILTED, solution_message
 
     if tilted and model in MODELS and MODELS[model].placed:
-        _print_line(TILTED)
+        _print_line(solution_message(TILTED))
     quick = model not in MODELS or MODELS[model].closed_form
     return at_work("solving for the flow", quiet=quiet or quick)
 

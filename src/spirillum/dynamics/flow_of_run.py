@@ -15,7 +15,7 @@ from spirillum.dynamics.run_file import attitudes_of, numbers_of, open_run, robo
 from spirillum.errors import InputError, check_choice
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
-from spirillum.fluid.tube.progress_messages import OF_A_RUN
+from spirillum.fluid.tube.progress_messages import OF_A_RUN, solution_message
 from spirillum.fluid.tube.tube import Tube
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.batch import RobotBatch
@@ -93,7 +93,7 @@ def flow_of_run(
     check_choice("frame", frame, get_args(Frame))
     at = moment_of_run(run, time, resolution)
     if progress is not None:
-        progress(OF_A_RUN, 0, 1)
+        progress(solution_message(OF_A_RUN), 0, 1)
     field = tube_flow_field(at.prediction.batch, at.body, at.rotor, at.phase, at.mean_flow)
     flow = Flow(at.prediction, field, at.phase, cast("Frame", frame), lifted=at.lifted)
     return replace(flow, held_force=float("nan")) if at.lifted > 0.0 else flow.with_held_force()

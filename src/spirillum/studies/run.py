@@ -18,7 +18,7 @@ from spirillum.files import atomic_write, opened
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.library import TabledTube, prepared_tables
-from spirillum.fluid.tube.progress_messages import ANNOUNCED
+from spirillum.fluid.tube.progress_messages import ANNOUNCED, LEVEL, SOLUTION, time_now
 from spirillum.fluid.tube.stages import StageName
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
@@ -159,7 +159,8 @@ def computed_study(
         count = sum(len(missing_tables(task.batch, "straight")) for task in walled)
         if count:
             words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
-            tell(f"{ESTIMATE}{words}, in some 10 s of one core each, up to 64 at a time; `prepare` makes tables", 0, 0)
+            takes = time_now(*(count * each for each in SOLUTION[LEVEL]), workers=(pool or WorkerPool()).workers)
+            tell(f"{ESTIMATE}{words}, in {takes}; `prepare` makes tables", 0, 0)
         tell(missing[0].words, done, len(requested))
     jobs = (requested[number].job(loaded, observed)._replace(number=number) for number in numbers)
     at_work = _worth(missing, pool or WorkerPool())

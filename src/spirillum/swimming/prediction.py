@@ -18,7 +18,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.fluid.tube.progress_messages import LEVEL, TILTED
+from spirillum.fluid.tube.progress_messages import LEVEL, TILTED, solution_message
 from spirillum.kernels.native import run_together
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
@@ -150,10 +150,10 @@ class Prediction(DisplayMixin):
         answer = self.to_dict(others=False)
         return answer, headline(answer)
 
-    def to_dict(self, *, others: bool = True) -> dict[str, Any]:
+    def to_dict(self, *, others: bool = True, other_models: bool = True) -> dict[str, Any]:
         """The answer of `spirillum predict --json`; with `others`, trial and steady motion stand in these."""
         band = self.band
-        beside = self.other_models if others else None
+        beside = self.other_models if others and other_models else None
         wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}
         if wanted:
             vars(self).update(zip(wanted, run_together(*wanted.values()), strict=True))
@@ -244,8 +244,8 @@ def predict(
         direct, tilted = chosen.form == "direct", bool(batch.placement.pitch or batch.placement.yaw)
         if direct and not tilted:
             instead = "" if why_no_table(batch) else "; `spirillum prepare` makes further answers immediate"
-            tell(f"{LEVEL}{instead}", 0, 1)
-        tell(TILTED if direct and tilted else chosen.name, 0, 1)
+            tell(f"{solution_message(LEVEL)}{instead}", 0, 1)
+        tell(solution_message(TILTED) if direct and tilted else chosen.name, 0, 1)
     checks = scenario.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = scenario.swim(batch)
     if not result.valid[0]:

@@ -9,10 +9,10 @@ from rich.table import Table
 
 from spirillum.cli.tables.parts import (
     RELEASED,
-    RELEASED_COLUMNS,
     Answer,
     Blocks,
     Detail,
+    answered_columns,
     band_grid,
     columns_grid,
     error_of,
@@ -22,6 +22,7 @@ from spirillum.cli.tables.parts import (
     in_words,
     placement_of,
     quantity_grid,
+    range_words,
     reason_of,
     released_columns,
     resting_pose,
@@ -44,12 +45,14 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     only = None if all_of_it else headline(answer)
     banded = "band" in answer or "kind" in answer["forward_velocity"]
-    released = any("reason" not in answer.get(column, {"reason": ""}) for column in RELEASED_COLUMNS)
+    released = answered_columns(answer)
     rows = (columns_grid if released else band_grid if banded else quantity_grid)(title, answer, only)
     yield rows
     more = len(rows_of(answer)) - rows.row_count
     if more:
         yield f"and {more} more quantities: --all"
+    if "band" in answer or (released and "gap" in answer["placement"]):
+        yield _over_poses(answer, "held" if released else "value")
     if "trial" in answer:
         yield from released_columns(answer)
     for item in answer.get("published", ()):
@@ -65,13 +68,17 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         level = answer["forward_velocity"]["level"]
         yield Detail(f"low and high: {100 * level:g} % interval of the robot's own motion")
         yield Detail(f"interval {answer['interval_of']}")
-    if "band" in answer:
-        poses = len(answer["band"]["gap"]["value"]) + 1
-        yield Detail(
-            f"band: low and high are the least and the largest of {poses} fixed poses, none "
-            "likelier than another; value: the pose above; in free motion (--motion free) it may swim outside the band"
-        )
     yield from error_of(answer["error_estimate"])
+
+
+def _over_poses(answer: Answer, column: str) -> str:
+    """What the pose of a value is, and over which poses its band is."""
+    pose = answer["placement"]
+    given = f"{column}: at a fixed pose ({', '.join(f'{name} {in_words(pose[name])}' for name in ('gap', 'pitch'))})"
+    if "band" not in answer:
+        return given
+    ranges = ", ".join(f"{name} {range_words(pose[name])}" for name in ("gap", "pitch") if "low" in pose[name])
+    return f"{given}; low and high over {len(answer['band']['gap']['value'])} more: {ranges}"
 
 
 def _beside_published(item: Answer) -> str:

@@ -23,7 +23,7 @@ class Detail(str):
 
 Block = str | Table  #: A line, a detail or a table of an answer; the first one is its title, or has it.
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "SI", "last 2/3 of run", "drive on", "steady part", "held", "trial", "steady")
+_NUMBERS = ("value", "low", "high", "last 2/3 of run", "drive on", "steady part", "held", "trial", "steady")
 """Columns of numbers, which are never folded: names are."""
 
 
@@ -48,10 +48,10 @@ def in_words(item: Any) -> str:
 
 
 def quantity_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None = None) -> Table:
-    """A row for each quantity that has a value, or of `only` these: name, value, unit, SI."""
-    table = grid(title, "quantity", "value", "unit", "SI")
+    """A row for each quantity that has a value, or of `only` these: name, value, unit."""
+    table = grid(title, "quantity", "value", "unit")
     for row in rows_of(items, only):
-        table.add_row(row.name, row.value, row.unit, row.si)
+        table.add_row(row.name, row.value, row.unit)
     return table
 
 
@@ -67,11 +67,12 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
     """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
     rows = {name: row for name in (answer if only is None else only) for row in rows_of(answer, [name])}
     ends = ("low", "high") if any(row.low for row in rows.values()) else ()
-    table = grid(title, "quantity", "held", *ends, *RELEASED_COLUMNS)
+    columns = answered_columns(answer)
+    table = grid(title, "quantity", "held", *ends, *columns)
     if ends:  # six columns at 80 characters: spaces between them, no lines
         table.box, table.padding, table.pad_edge = SIMPLE_HEAVY, (0, 0, 0, 1), False
     for name, row in rows.items():
-        released = (answer[column].get(name) for column in RELEASED_COLUMNS)
+        released = (answer[column].get(name) for column in columns)
         cells = ["-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released]
         words = "efficiency" if name == "hydrodynamic_efficiency" else row.name
         label = f"{words}, {row.unit}" if row.unit else words
@@ -80,6 +81,11 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
 
 
 RELEASED_COLUMNS = ("trial", "steady")  #: Entries of an answer beside the held one.
+
+
+def answered_columns(answer: Answer) -> list[str]:
+    """Those released motions of an answer that have values, not the reason why they are missing."""
+    return [column for column in RELEASED_COLUMNS if "reason" not in answer.get(column, {"reason": ""})]
 
 
 def released_columns(answer: Answer) -> Iterator[Block]:
@@ -204,11 +210,14 @@ def _range_words(item: Mapping[str, Any]) -> str:
 
 def _band_words(item: Mapping[str, Any]) -> str:
     """Over what a field of the placement is left open."""
-    if "low" not in item:
-        return ""
+    return f" (open: band over {range_words(item)})" if "low" in item else ""
+
+
+def range_words(item: Mapping[str, Any]) -> str:
+    """Ends of a band in one unit."""
     unit = display_unit(item["high"], item["unit"])
     low, high = (in_unit(item[key], item["unit"], unit) for key in ("low", "high"))
-    return f" (open: band over {low} to {high} {unit})"
+    return f"{low} to {high} {unit}"
 
 
 def reason_of(answer: Answer) -> Iterator[Detail]:
@@ -221,5 +230,6 @@ def error_of(error: Answer) -> Iterator[Detail]:
     """A model's own estimate, where it has one, and its known error in words."""
     if error["value"] is not None:
         against = error.get("against", "another resolution")
-        yield Detail(f"error estimate: {percent(error['value'])} of the forward velocity, against {against}")
+        share = percent(error["value"])
+        yield Detail(f"numerical error, no interval: {share} of the forward velocity, against {against}")
     yield Detail(f"known error: {error['statement']}")

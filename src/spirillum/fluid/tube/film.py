@@ -31,7 +31,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from spirillum.arrays import Matrix6, Samples
 from spirillum.errors import InputError
@@ -133,6 +132,8 @@ def film_resistance(
 
 def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float, *, fineness: float = 1.0) -> Matrix6:
     """Resistance of the lubrication film of a preprocessed body; arguments and result of `film_resistance`."""
+    from scipy.linalg import cholesky, solve_triangular
+
     place = Place(body, radius, e, frame(p, psi))
     grid = _STANDARD._replace(along=round(fineness * _STANDARD.along), around=round(fineness * _STANDARD.around))
     along, around = _element(grid.along), _halves(grid.around)

@@ -16,7 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.tube.film_surface import FilmBody
-from spirillum.fluid.tube.progress_messages import time_span
+from spirillum.fluid.tube.progress_messages import time_on_free_cores
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
@@ -129,7 +129,7 @@ class Places:
 
     def time_to_solve(self, workers: int = 2) -> str:
         """How long a fast and a slow machine need for them, in words."""
-        return time_span(*(self.solutions * each / workers for each in self.stage.seconds))
+        return time_on_free_cores(*(self.solutions * each for each in self.stage.seconds), workers=workers)
 
     @cached_property
     def yaw_gaps(self) -> Samples:

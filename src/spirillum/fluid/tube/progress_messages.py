@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import os
+from concurrent.futures import ThreadPoolExecutor
+from hashlib import sha256
+from statistics import fmean
+from time import perf_counter, thread_time
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TILTED = "a pitched or yawed pose without a table: the flow is solved for in minutes of one core"
-LEVEL = "no table of this tube: the flow is solved for in some half a minute"
-"""How a message begins that is to be read where the answer is not there at once."""
-OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of one core"
-"""Progress messages that are to be read, too."""
+TILTED = "a pitched or yawed pose without a table: the flow is solved for"
+LEVEL = "no table of this tube: the flow is solved for"
+OF_A_RUN = "the flow at a moment of a run: it is solved for"
+"""How messages begin that are to be read, too; the second only where the answer is not there at once."""
+SOLUTION = {LEVEL: (5.0, 20.0), TILTED: (10.0, 40.0), OF_A_RUN: (60.0, 180.0)}
+"""What a fast and a slow core need for each, s."""
 
 
 def time_span(least: float, most: float) -> str:
@@ -25,28 +29,50 @@ def _rounded(seconds: float) -> tuple[int, str]:
     return (max(round(seconds / 10.0), 1) * 10, "s") if seconds < 95.0 else (round(seconds / 60.0), "min")
 
 
+def time_on_free_cores(least: float, most: float, workers: int = 1) -> str:
+    """Return how long work that takes so many seconds of one core takes on free ones, in words."""
+    cores = f"{workers} free cores" if workers > 1 else "a free core"
+    return f"{time_span(least / workers, most / workers)} on {cores}"
+
+
+def time_now(least: float, most: float, workers: int = 1) -> str:
+    """Return `time_on_free_cores` and, where other work slows this machine down, how long it takes beside that."""
+    free, times = time_on_free_cores(least, most, workers), slowdown(workers)
+    if times < _BUSY:
+        return free
+    return f"{free}, {time_span(times * least / workers, times * most / workers)} beside the other work of this machine"
+
+
+def solution_message(begin: str) -> str:
+    """Return one of `SOLUTION` with how long it takes."""
+    return f"{begin} in {time_now(*SOLUTION[begin])}"
+
+
 def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, float]) -> str:
     """Return the announcement of a table that is made: from how many poses, and about how long it takes."""
     remaining = poses - kept
     before = f", {kept} of them saved before, {remaining} remaining" if kept else ""
-    least, most = (remaining * each / max(workers, 1) for each in seconds)
-    busy = _slowdown(workers)
-    takes = time_span(least, most * busy)
-    other = " beside the other work of this machine" if busy > _BUSY else ""
-    return (
-        f"{ANNOUNCED}: it is computed once from {poses} poses{before}, in {takes} with "
-        f"{'1 process' if workers == 1 else f'{workers} processes'}{other}"
-    )
+    takes = time_now(*(remaining * each for each in seconds), workers=max(workers, 1))
+    return f"{ANNOUNCED}: it is computed once from {poses} poses{before}, in {takes}"
 
 
 _BUSY = 1.5
 """Slowdown by other work from which on it is named."""
+_MOMENT = 0.05  # time for which the slowdown is measured, s
+_BLOCK = bytes(1 << 20)
 
 
-def _slowdown(workers: int) -> float:
-    """How many times longer work takes beside what runs on this machine; 1 where the system does not report it."""
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-    return max((load + workers) / max(os.cpu_count() or 1, workers), 1.0)
+def slowdown(workers: int) -> float:
+    """Measure for a moment how many times longer threads take that work now than on free cores."""
+    with ThreadPoolExecutor(workers) as pool:
+        return fmean(pool.map(_slowdown_of_thread, range(workers)))
+
+
+def _slowdown_of_thread(_: int) -> float:
+    wall, own = perf_counter(), thread_time()
+    while perf_counter() - wall < _MOMENT:
+        sha256(_BLOCK)  # without the lock of the interpreter
+    return max((perf_counter() - wall) / max(thread_time() - own, 1e-3), 1.0)
 
 
 def kept_after(poses: int, kept: int) -> str:
