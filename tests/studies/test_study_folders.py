@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.studies.work import ModelTask, run_job
+from spirillum.studies.study_loader import load_study
+from spirillum.studies.work import ModelTask, run_job, tasks
 
 
 @pytest.fixture(autouse=True)
@@ -41,6 +42,7 @@ def test_interrupted_study_resumes_where_it_stopped(
     done.clear()
     damaged = parts / "part-00001.npz"
     damaged.write_bytes(damaged.read_bytes()[:100])
+    (parts / "part-00003.npz").write_bytes((parts / "part-00000.npz").read_bytes())  # another's, of the same shape
     resumed = sp.study(small, output=tmp_path / "out")
     assert done == [1, 3]
     assert resumed.identical(whole)
@@ -67,6 +69,13 @@ def test_parts_of_another_shape_or_study_are_not_taken(small: dict[str, object],
     stale.mkdir()
     np.savez(stale / "part-00003.npz", forward_velocity=np.zeros((4, 3)))
     assert sp.study(small, output=tmp_path / "out").identical(whole)
+
+
+@pytest.mark.parametrize(("body", "sizes"), [({}, [2]), ({"body.diameter": "16 mm"}, [1, 1])])
+def test_robots_without_a_table_are_answered_and_kept_one_by_one(body: dict[str, str], sizes: list[int]) -> None:
+    """Each takes as long as hundreds that have one."""
+    asked = {"robots": ["biorob2012-wide"], "vary": {"tail.amplitude": ["2 mm", "2.5 mm"]}, "models": ["tube"]}
+    assert [task.size for task in tasks(load_study(asked, body))] == sizes
 
 
 def test_folder_of_another_study_is_refused(small: dict[str, object], tmp_path: Path) -> None:

@@ -75,24 +75,28 @@ def kept(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, 
             ):
                 return None
             with np.load(stream, allow_pickle=False) as stored:
-                part = {name: stored[name] for name in stored.files}
+                part = {name: stored[name] for name in stored.files if name != _MARK}
+                mark = stored[_MARK]
     except Exception:  # a damaged file raises whatever the libraries meet first
         return None
     whole = task.needed <= set(part) <= task.allowed
     fits = all(array.dtype == np.float64 and array.shape[: len(leading)] == leading for array in part.values())
-    return part if whole and fits else None
+    return part if whole and fits and np.array_equal(mark, task.mark) else None
 
 
-def keep(number: int, part: Part, folder: Path) -> None:
+_MARK = "task"
+
+
+def keep(number: int, task: StudyTask, part: Part, folder: Path) -> None:
     """Keep a finished answer."""
     with atomic_write(folder / _PART.format(number), replace="any") as path, path.open("wb") as stream:
-        np.savez(stream, **cast("dict[str, Any]", part))
+        np.savez(stream, **cast("dict[str, Any]", {**part, _MARK: task.mark}))
 
 
 @contextmanager
-def _kept_at_times(folder: Path | None) -> Iterator[Callable[[int, Part], None]]:
+def _kept_at_times(folder: Path | None) -> Iterator[Callable[[int, StudyTask, Part], None]]:
     """A function that takes finished answers: each second they are kept together, and all of them at an error."""
-    waiting: list[tuple[int, Part]] = []
+    waiting: list[tuple[int, StudyTask, Part]] = []
     last = monotonic()
 
     def keep_all() -> None:
@@ -102,8 +106,8 @@ def _kept_at_times(folder: Path | None) -> Iterator[Callable[[int, Part], None]]
             del waiting[0]
         last = monotonic()
 
-    def finished(number: int, part: Part) -> None:
-        waiting.append((number, part))
+    def finished(number: int, task: StudyTask, part: Part) -> None:
+        waiting.append((number, task, part))
         if monotonic() - last > _PERIOD:
             keep_all()
 
@@ -159,7 +163,8 @@ def computed_study(
         count = sum(len(missing_tables(task.batch, "straight")) for task in walled)
         if count:
             words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
-            takes = time_now(*(count * each for each in SOLUTION[LEVEL]), workers=(pool or WorkerPool()).workers)
+            fast, slow = SOLUTION[LEVEL]
+            takes = time_now((count * fast, count * slow), (pool or WorkerPool()).workers)
             tell(f"{ESTIMATE}{words}, in {takes}; `prepare` makes tables", 0, 0)
         tell(missing[0].words, done, len(requested))
     jobs = (requested[number].job(loaded, observed)._replace(number=number) for number in numbers)
@@ -167,7 +172,7 @@ def computed_study(
     with _kept_at_times(parts) as finished:
         for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
             found[job.number] = part
-            finished(job.number, part)
+            finished(job.number, requested[job.number], part)
             done += 1
             tell(requested[job.number].words, done, len(requested))
     tell("dataset", len(requested), len(requested))

@@ -6,12 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import PerRobot, Values
 from spirillum.data_tables import rows_of
+from spirillum.display import counted
 from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
@@ -46,9 +48,10 @@ _ENDINGS = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_inte
 """What the names of a quantity's arrays end with."""
 BLOCK = 25_000  #: Robots of a task in closed form: a fifth of a second of work.
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
-_PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one pose
+_TABLED_BLOCK = 64  # of one whose robots have tables; without one a robot takes as long, and is a task of its own
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+Marks = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]
 """Parts of a batch, their indices in it, and the model of each."""
@@ -66,6 +69,12 @@ class StudyTask(ABC):
     def size(self) -> int:
         """Number of robots."""
         return int(self.indices.size)
+
+    @property
+    def mark(self) -> Marks:
+        """Digest of what is answered: blocks have other numbers and sizes once tables are made."""
+        asked = f"{type(self).__name__} {self.words} {self.indices.tolist()}"
+        return np.frombuffer(sha256(asked.encode()).digest(), dtype=np.uint8)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -157,7 +166,7 @@ class ModelTask(OneModel):
     @property
     def words(self) -> str:
         """Progress message."""
-        return f"{self.model}, {self.size} robots"
+        return f"{self.model}, {counted(self.size, 'robot')}"
 
     def job(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> StudyJob:
         """Return the task with its observations, and its robots where their posterior draws are requested."""
@@ -229,10 +238,16 @@ def tasks(loaded: LoadedStudy) -> Iterator[ModelTask]:
     """All tasks of a study, always in the same order."""
     for indices, batch in groups(loaded):
         for name in loaded.study.models:
-            model = find_swimmer_model(name)
-            size = BLOCK if model.closed_form else _PLACED_BLOCK if model.placed else _SMALL_BLOCK
-            for cut, block in batch.blocks(size):
+            for cut, block in batch.blocks(_block_size(find_swimmer_model(name), batch)):
                 yield ModelTask(indices[cut], name, block)
+
+
+def _block_size(model: SwimmerModel, batch: RobotBatch) -> int:
+    if model.closed_form:
+        return BLOCK
+    if not model.placed:
+        return _SMALL_BLOCK
+    return 1 if quickest(model, batch) is model else _TABLED_BLOCK
 
 
 def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:

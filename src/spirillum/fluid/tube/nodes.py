@@ -129,7 +129,8 @@ class Places:
 
     def time_to_solve(self, workers: int = 2) -> str:
         """How long a fast and a slow machine need for them, in words."""
-        return time_on_free_cores(*(self.solutions * each for each in self.stage.seconds), workers=workers)
+        fast, slow = self.stage.seconds
+        return time_on_free_cores((self.solutions * fast, self.solutions * slow), workers)
 
     @cached_property
     def yaw_gaps(self) -> Samples:

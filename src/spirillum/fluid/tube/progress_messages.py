@@ -29,30 +29,32 @@ def _rounded(seconds: float) -> tuple[int, str]:
     return (max(round(seconds / 10.0), 1) * 10, "s") if seconds < 95.0 else (round(seconds / 60.0), "min")
 
 
-def time_on_free_cores(least: float, most: float, workers: int = 1) -> str:
-    """Return how long work that takes so many seconds of one core takes on free ones, in words."""
+def time_on_free_cores(seconds: tuple[float, float], workers: int = 1) -> str:
+    """Return how long work takes on free cores, in words, from what a fast and a slow core need for all of it."""
     cores = f"{workers} free cores" if workers > 1 else "a free core"
-    return f"{time_span(least / workers, most / workers)} on {cores}"
+    return f"{_shared(seconds, workers)} on {cores}"
 
 
-def time_now(least: float, most: float, workers: int = 1) -> str:
+def time_now(seconds: tuple[float, float], workers: int = 1) -> str:
     """Return `time_on_free_cores` and, where other work slows this machine down, how long it takes beside that."""
-    free, times = time_on_free_cores(least, most, workers), slowdown(workers)
-    if times < _BUSY:
-        return free
-    return f"{free}, {time_span(times * least / workers, times * most / workers)} beside the other work of this machine"
+    free, times = time_on_free_cores(seconds, workers), slowdown(workers)
+    return free if times < _BUSY else f"{free}, {_shared(seconds, workers / times)} beside this machine's other work"
+
+
+def _shared(seconds: tuple[float, float], cores: float) -> str:
+    return time_span(seconds[0] / cores, seconds[1] / cores)
 
 
 def solution_message(begin: str) -> str:
     """Return one of `SOLUTION` with how long it takes."""
-    return f"{begin} in {time_now(*SOLUTION[begin])}"
+    return f"{begin} in {time_now(SOLUTION[begin])}"
 
 
 def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, float]) -> str:
     """Return the announcement of a table that is made: from how many poses, and about how long it takes."""
     remaining = poses - kept
     before = f", {kept} of them saved before, {remaining} remaining" if kept else ""
-    takes = time_now(*(remaining * each for each in seconds), workers=max(workers, 1))
+    takes = time_now((remaining * seconds[0], remaining * seconds[1]), max(workers, 1))
     return f"{ANNOUNCED}: it is computed once from {poses} poses{before}, in {takes}"
 
 
