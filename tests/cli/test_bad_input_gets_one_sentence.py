@@ -26,6 +26,10 @@ WIDE = "biorob2012-wide"
         (["predict", WIDE, "--plot", ""], "--plot '' is empty; allowed: --plot FILE"),
         (["settle", WIDE, "-o", "a.png", "--plot", "b.png"], "is given twice; allowed: one FILE"),
         (["predict", WIDE, "--plot", "a\x01b.png"], r"'a\x01b.png' holds a control character"),
+        (
+            ["compare-models", WIDE, "--model", "rft", "--plot", "a.png"],
+            "--plot with --model rft: effects need sbt and",
+        ),
         (["compare-models", WIDE, "--calibrated", "--plot", "a.png"], "--plot with --calibrated: effects need"),
         (["simulate", WIDE, "--output="], "--output '' is empty; allowed: --output FILE"),
         (["predict", WIDE, "--plot", "/proc/x.png"], "/proc/x.png cannot be written"),

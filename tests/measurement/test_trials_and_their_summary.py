@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
+import spirillum as sp
 from spirillum.measurement.measure import Measurement, compared, summary_of
 from spirillum.measurement.outliers import without_lead
 from spirillum.measurement.series import observation_rows
@@ -64,6 +65,17 @@ def test_rates_over_trials_have_students_interval(make_trial: MakeTrial) -> None
     half = t.ppf(0.975, 4) * np.std(0.1 * np.arange(5), ddof=1) / np.sqrt(5)
     assert item.value == pytest.approx(7.2, rel=1e-3)
     assert item.high - item.value == pytest.approx(half, rel=5e-2)
+
+
+@pytest.mark.parametrize(("tails", "unlike"), [((7.0, 7.2, 7.4), False), ((7.0, 9.5), True), ((7.0, -7.0), True)])
+def test_trials_that_are_no_repeats_are_said_to_be_averaged(
+    make_trial: MakeTrial, tails: tuple[float, ...], unlike: bool
+) -> None:
+    trials = [make_trial(f"{seed}", seed=seed, tail=tail) for seed, tail in enumerate(tails)]
+    found = Measurement(tuple(trials), summary_of(trials), sp.load("biorob2012-wide"), "setup.toml").warnings
+    assert [note.fields for note in found if "as repeats" in note] == (
+        [("tail_rotation_rate", "motor_rotation_rate")] if unlike else []
+    )
 
 
 def test_one_trial_keeps_its_own_interval(make_trial: MakeTrial) -> None:

@@ -128,8 +128,9 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
-    if calibrated:
-        refuse_conflicts(context, "calibrated")
+    named = request.typed.get("models") or ["sbt", "slender"]
+    states = [*(["calibrated"] if calibrated else []), *([] if {"sbt", "slender"} <= {*named} else ["no effects"])]
+    refuse_conflicts(context, *states, models=" --model ".join(named))
     draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.comparison:effects_figure")
     check_apart(output, plot)
     with renderer.progress_bar(quiet=json) as progress:

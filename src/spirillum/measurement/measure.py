@@ -155,6 +155,10 @@ class Measurement(DisplayMixin):
                 "means over two trials: one difference gives their intervals, which may be several times too wide or "
             )
             found.append(Note("intervals-incomplete", f"{words}too narrow; measure more trials", two))
+        unlike = [name for name in RATE_NAMES if _differ([trial.quantities[name] for trial in self.trials])]
+        if unlike:
+            words = f"trials differ by over a quarter in {' and '.join(unlike[:2]).replace('_', ' ')}"
+            found.append(Note("outlier", f"{words}: the mean takes them as repeats; measure unlike ones apart", unlike))
         if self.files and TABLE not in self.files:
             free = self.robot.channel is None
             why = f"the robot has no channel, which {TABLE} states" if free else "no trial gives a speed or a rate"
@@ -175,6 +179,19 @@ class Measurement(DisplayMixin):
             "files": list(self.files),
         }
         return envelope("measurement", content, self.warnings)
+
+
+_UNLIKE = 1.25  # ratio from which on trials of one robot are no repeats: those of one drive scatter by some per cent
+
+
+def _differ(found: Sequence[Measured]) -> bool:
+    """Whether the least and the largest of some values differ by more than their intervals and `_UNLIKE`."""
+    known = sorted((item for item in found if math.isfinite(item.value)), key=lambda item: item.value)
+    if len(known) < 2:
+        return False
+    least, most = known[0], known[-1]
+    small, large = sorted((abs(least.value), abs(most.value)))
+    return least.high < most.low and (least.value * most.value <= 0.0 or large > _UNLIKE * small)
 
 
 def _notes(trial: Trial) -> list[Note]:
