@@ -17,7 +17,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports and figures have tests of their own, and take most of the time."""
     monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
-    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_figures", lambda _: {})
+    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_drawings", lambda _: {})
 
 
 @pytest.mark.usefixtures("plain")

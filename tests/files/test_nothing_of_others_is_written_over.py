@@ -210,8 +210,8 @@ def test_an_interrupted_calibration_is_run_again_and_loses_nothing(
     from spirillum.results import calibration
     from spirillum.view.figures import style
 
-    figures = "spirillum.view.figures.calibration.calibration_figures"
-    monkeypatch.setattr(figures, lambda _found: dict.fromkeys(("residuals", "profiles")))
+    drawings = "spirillum.view.figures.calibration.calibration_drawings"
+    monkeypatch.setattr(drawings, lambda _found: dict.fromkeys(("residuals", "profiles"), lambda: None))
     monkeypatch.setattr(style, "save", _stopped_at_the_second(style.save))
     with pytest.raises(KeyboardInterrupt):
         sp.calibrate(tmp_path / "o.csv", WIDE, **options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +34,7 @@ _SAMPLING = {"sampling": ("spirillum.calibration.posterior:Sampling",)}
 
 @from_function(
     "spirillum.results.calibration:calibrate",
-    without={**_SAMPLER, "robots": "the argument"},
+    without={**_SAMPLER, "robots": "the argument", "workers": "figures are drawn in two processes"},
     complete={"method": choices(*METHODS)},
     robot=None,
     tables=_SAMPLING,
@@ -81,6 +82,7 @@ def calibrate(
             friction=friction,
             assume_uncertainty=_stated(assume_uncertainty or ()),
             sampling=Sampling(**request.take("sampling")),
+            workers=min(os.cpu_count() or 1, 2),
             progress=progress,
         )
     renderer.show(found.to_dict(), json=json)

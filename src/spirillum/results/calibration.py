@@ -7,9 +7,10 @@ import io
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from math import isfinite, nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,10 +22,15 @@ from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inp
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.formats.templates import rendered
 from spirillum.notes import Note
+from spirillum.results.page import Drawings, draw_together, load_figures
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
 from spirillum.version import versions
+from spirillum.worker_pool import process_beside
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
 
 
 def _number(value: float) -> str:
@@ -136,6 +142,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
     answer: str = "held",
     figures: bool = True,
     vector: bool = False,
+    workers: int = 1,
     progress: Progress | None = None,
 ) -> Calibrated:
     """Fit parameters of a model to observed speeds and rates.
@@ -159,6 +166,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             `friction_coefficient`, `shared_friction`, `roughness`); a second for each of 32 trials of a robot.
         figures: draw figures, which takes some seconds.
         vector: write figures as SVG beside PNG.
+        workers: number of processes; where it is not 1, another one draws half of the figures.
         progress: called with stage, number done, and total.
 
     Raises:
@@ -173,6 +181,8 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             folder = stack.enter_context(results_folder(output))
             stack.enter_context(guard_inputs(*inputs))
             check_folder(folder)
+        drawn = figures and folder is not None and workers != 1
+        beside = stack.enter_context(process_beside(_load)) if drawn else None
         found = fit_model(
             observations,
             robots,
@@ -189,7 +199,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
         return (
             found
             if folder is None
-            else write_calibration(found, folder, figures=figures, vector=vector, progress=progress)
+            else write_calibration(found, folder, figures=figures, vector=vector, beside=beside, progress=progress)
         )
 
 
@@ -199,6 +209,7 @@ def write_calibration(
     *,
     figures: bool = True,
     vector: bool = False,
+    beside: ProcessPoolExecutor | None = None,
     progress: Progress | None = None,
 ) -> Calibrated:
     """Write all files of a calibration, the figures last, each whole or not at all; return it with their names."""
@@ -218,7 +229,7 @@ def write_calibration(
         if path not in written:
             path.unlink(missing_ok=True)
     if figures:
-        written += _drawn(found, folder, progress, vector=vector)
+        written += _drawn(found, folder, progress, vector=vector, beside=beside)
     files = sorted(str(path.relative_to(folder)) for path in written)
     gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
     said = [Note("files", f"{folder} held an earlier calibration: its {gone} are gone")] if gone else []
@@ -233,18 +244,38 @@ def _gone(paths: Sequence[Path]) -> str:
     return " and ".join(names)
 
 
-def _drawn(found: Calibrated, folder: Path, progress: Progress | None, *, vector: bool) -> list[Path]:
-    from spirillum.view.figures.calibration import calibration_figures
-    from spirillum.view.figures.style import save
-
+def _drawn(
+    found: Calibrated,
+    folder: Path,
+    progress: Progress | None,
+    *,
+    vector: bool,
+    beside: ProcessPoolExecutor | None,
+) -> list[Path]:
+    drawings = _drawings(found)
     on_progress = progress or (lambda _what, _done, _total: None)
-    on_progress("figures", 0, 1)
-    inside = output_folder(folder / "figures", folder)
-    written: list[Path] = []
-    for name, figure in calibration_figures(found).items():
-        written += save(figure, inside / name, vector=vector)
-    on_progress("figures", 1, 1)
-    return written
+    written = draw_together(
+        drawings,
+        output_folder(folder / "figures", folder),
+        lambda name, done: on_progress(f"figure {name}", done, len(drawings)),
+        vector=vector,
+        again=partial(_drawings, found),
+        beside=beside,
+    )
+    return [path for paths in written.values() for path in paths]
+
+
+def _drawings(found: Calibrated) -> Drawings:
+    from spirillum.view.figures.calibration import calibration_drawings
+
+    return calibration_drawings(found)
+
+
+def _load() -> None:
+    """Import the figures of a calibration and what drawing takes, in a process that draws beside this one."""
+    import spirillum.view.figures.calibration  # noqa: F401
+
+    load_figures()
 
 
 def predictions_text(found: Calibrated) -> str:

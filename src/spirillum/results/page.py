@@ -5,7 +5,9 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Mapping
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +16,13 @@ from spirillum.files import output_folder
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
+    from matplotlib.figure import Figure
+
     from spirillum.view.figures.sheet import Picture
+
+
+Drawings = Mapping[str, "Callable[[], Figure]"]
+"""Functions that draw figures, by the names of their files."""
 
 
 @dataclass(frozen=True)
@@ -51,22 +59,12 @@ def draw_pictures(
         beside: a process that draws every second picture with it.
     """
     figures = output_folder(folder / "figures", folder)
-    theirs: dict[str, Future[list[Path]]] = {}
-    if beside is not None and again is not None:
-        beside.submit(_take_pictures, again)
-        every_second = list(pictures)[1::2]
-        theirs = {name: beside.submit(_draw_taken, name, figures, vector=vector) for name in every_second}
-    written: dict[str, list[Path]] = {}
-    for name in (*(name for name in pictures if name not in theirs), *reversed(theirs)):
-        if name not in theirs or theirs[name].cancel():  # of those that the other process has not begun
-            on_progress(name, len(written))
-            written[name] = _drawn(pictures[name], figures / name, vector=vector)
+    drawings = {name: picture.figure for name, picture in pictures.items()}
+    shared = None if again is None else partial(_drawings_of, again)
+    written = draw_together(drawings, figures, on_progress, vector=vector, again=shared, beside=beside)
     found = []
     for name, picture in pictures.items():
-        try:
-            paths = written[name] if name in written else theirs[name].result()
-        except BrokenProcessPool:  # ended from outside, as for want of memory
-            paths = _drawn(picture, figures / name, vector=vector)
+        paths = written[name]
         if vector and paths[-1].stat().st_size <= largest_svg:
             source = data_uri(paths[-1].read_bytes(), "svg+xml")
         else:
@@ -76,22 +74,66 @@ def draw_pictures(
     return found
 
 
-def _drawn(picture: Picture, path: Path, *, vector: bool) -> list[Path]:
+def _drawings_of(again: Callable[[], Mapping[str, Picture]]) -> Drawings:
+    return {name: picture.figure for name, picture in again().items()}
+
+
+def draw_together(
+    drawings: Drawings,
+    figures: Path,
+    on_progress: Callable[[str, int], None],
+    *,
+    vector: bool = False,
+    again: Callable[[], Drawings] | None = None,
+    beside: ProcessPoolExecutor | None = None,
+) -> dict[str, list[Path]]:
+    """Write figures by name into a folder, every second one in the process beside this one; return their files.
+
+    `again` returns the same figures in that process.
+    """
+    theirs: dict[str, Future[list[Path]]] = {}
+    if beside is not None and again is not None:
+        with suppress(BrokenProcessPool):  # ended from outside, as for want of memory
+            beside.submit(_take_drawings, again)
+            theirs = {name: beside.submit(_draw_taken, name, figures, vector=vector) for name in list(drawings)[1::2]}
+    written: dict[str, list[Path]] = {}
+    for name in (*(name for name in drawings if name not in theirs), *reversed(theirs)):
+        if name not in theirs or theirs[name].cancel():  # of those that the other process has not begun
+            on_progress(name, len(written))
+            written[name] = _drawn(drawings[name], figures / name, vector=vector)
+    for name in drawings.keys() - written.keys():
+        try:
+            written[name] = theirs[name].result()
+        except BrokenProcessPool:
+            written[name] = _drawn(drawings[name], figures / name, vector=vector)
+    return {name: written[name] for name in drawings}
+
+
+def _drawn(draw: Callable[[], Figure], path: Path, *, vector: bool) -> list[Path]:
     from spirillum.view.figures.style import save
 
-    return save(picture.figure(), path, vector=vector)
+    return save(draw(), path, vector=vector)
 
 
-_TAKEN: dict[str, Picture] = {}
-"""Pictures of a process that draws beside another one."""
+_TAKEN: dict[str, Callable[[], Figure]] = {}
+"""Figures of a process that draws beside another one."""
 
 
-def _take_pictures(again: Callable[[], Mapping[str, Picture]]) -> None:
+def _take_drawings(again: Callable[[], Drawings]) -> None:
     _TAKEN.update(again())
 
 
 def _draw_taken(name: str, figures: Path, *, vector: bool) -> list[Path]:
     return _drawn(_TAKEN[name], figures / name, vector=vector)
+
+
+def load_figures() -> None:
+    """Load what drawing takes, with the fonts and the parser of formulas: of a process that draws beside this one."""
+    from spirillum.view.figures.sheet import Sheet
+    from spirillum.view.figures.style import PAGE, styled
+
+    with styled():
+        Sheet("$x$", "", width=PAGE, heights=[1.0], columns=1).finished()
 
 
 def data_uri(picture: bytes, kind: str) -> str:

@@ -23,7 +23,7 @@ from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
-from spirillum.results.page import draw_pictures
+from spirillum.results.page import draw_pictures, load_figures
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_store import stored_study
 from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
@@ -37,8 +37,7 @@ from spirillum.studies.study_loader import LARGEST_STUDY, load_study, observed_a
 from spirillum.view.figures.comparison import ranking_picture
 from spirillum.view.figures.release import release_picture
 from spirillum.view.figures.robot import robot_figure, robot_words
-from spirillum.view.figures.sheet import Picture, Sheet
-from spirillum.view.figures.style import PAGE, styled
+from spirillum.view.figures.sheet import Picture
 from spirillum.worker_pool import pool_of_workers, process_beside
 
 if TYPE_CHECKING:
@@ -251,7 +250,7 @@ def study(  # noqa: PLR0913 - the options of the command
                 check_replaceable(folder / name, begins=begin.encode())
         make_tables(loaded, pool, on_progress)
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
-        with process_beside(_import_figures) if figures and workers != 1 else nullcontext() as beside:
+        with process_beside(_load) if figures and workers != 1 else nullcontext() as beside:
             if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
                 parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
                 dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
@@ -264,10 +263,9 @@ def study(  # noqa: PLR0913 - the options of the command
     return StudyDataset.of(dataset)
 
 
-def _import_figures() -> None:
-    """Load what drawing takes: this module has its imports, an empty sheet the fonts and the parser of formulas."""
-    with styled():
-        Sheet("$x$", "", width=PAGE, heights=[1.0], columns=1).finished()
+def _load() -> None:
+    """Import this module and what drawing takes, in a process that draws beside this one."""
+    load_figures()
 
 
 def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:

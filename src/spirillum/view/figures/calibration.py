@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.experiment import Quantity
     from spirillum.calibration.identifiability import LikelihoodProfile
+    from spirillum.calibration.least_squares import LeastSquares
 
 
 _MOST = 6  # numbers of the figure: more would leave no room for a pair's contours
@@ -209,18 +211,27 @@ _NAMES: dict[Quantity, str] = {
 
 def calibration_figures(found: Calibrated) -> dict[str, Figure]:
     """All figures by name."""
-    from spirillum.calibration.identifiability import profiles
+    return {name: draw() for name, draw in calibration_drawings(found).items()}
 
-    figures = {
-        f"observed-{diameter * 1e3:g}mm": observed_figure(found, index)
+
+def calibration_drawings(found: Calibrated) -> dict[str, Callable[[], Figure]]:
+    """What draws each figure, by name."""
+    drawings: dict[str, Callable[[], Figure]] = {
+        f"observed-{diameter * 1e3:g}mm": partial(observed_figure, found, index)
         for index, diameter in enumerate(found.experiment.channels)
     }
-    figures["residuals"] = residual_figure(found)
+    drawings["residuals"] = partial(residual_figure, found)
     if found.posterior is not None:
-        figures["posterior"] = posterior_figure(found)
+        drawings["posterior"] = partial(posterior_figure, found)
     if found.least_squares is not None:
-        figures["profiles"] = profile_figure(found, profiles(found.problem, found.least_squares))
-    return figures
+        drawings["profiles"] = partial(_profiles, found, found.least_squares)
+    return drawings
+
+
+def _profiles(found: Calibrated, fit: LeastSquares) -> Figure:
+    from spirillum.calibration.identifiability import profiles
+
+    return profile_figure(found, profiles(found.problem, fit))
 
 
 def _source(found: Calibrated) -> str:
