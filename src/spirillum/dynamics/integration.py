@@ -177,9 +177,9 @@ def run_sizes(robot: FreeRobot) -> Samples:
     return sizes
 
 
-def observed_at(robot: FreeRobot, state: Samples, time: float = 0.0) -> Samples:
-    """What is observed in one state, (13,), or (26,) in a tube."""
-    return np.asarray(robot.observe(np.array([time]), state[None])[0])
+def observed_at(robot: FreeRobot, state: Samples) -> Samples:
+    """What is observed in one state, (13,), or (31,) in a tube."""
+    return np.asarray(robot.observe(np.zeros(1), state[None])[0])
 
 
 def _duty(switches: Sequence[Switch], time: float) -> float:

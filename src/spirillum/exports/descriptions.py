@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -97,12 +97,8 @@ _PLACES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1
 _FULL_INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
-def _rgba(colour: Sequence[float]) -> str:
-    return numbers([*np.round(colour, 4), 1.0])
-
-
 _FILTERS: dict[str, Callable[..., str]] = {
-    "rgba": _rgba,
+    "rgba": lambda colour: numbers([*np.asarray(colour).round(4), 1.0]),
     "inertia": lambda link: numbers(link.inertia[_PLACES[name]] for name in _FULL_INERTIA),
 }
 

@@ -7,6 +7,7 @@ errors; what it commands reaches the drive after the remote's delay, or not at a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -38,27 +39,6 @@ class ObservedNumber(NamedTuple):
     unit: str
     low: float
     high: float
-
-
-class _Past:
-    """The last values of all robots, in a ring."""
-
-    def __init__(self, length: int, count: int) -> None:
-        self._rows, self._last = np.zeros((length, count)), 0
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def append(self, values: Samples) -> None:
-        self._last = (self._last + 1) % len(self._rows)
-        self._rows[self._last] = values
-
-    def ago(self, steps: int) -> Samples:
-        """Values so many steps ago; a view."""
-        return np.asarray(self._rows[self._last - steps])
-
-    def forget(self, which: np.ndarray) -> None:
-        self._rows[:, which] = 0.0
 
 
 class TaskEnvironment(ABC):
@@ -119,8 +99,10 @@ class TaskEnvironment(ABC):
         """Steps of an episode."""
         late, slow = round(self.lab.camera.latency / self.dt), max(1, round(_SEEN_OVER / self.dt))
         self._late, self._slow = late, slow
-        self._frames = _Past(late + slow + 1, count)
-        self._commands = _Past(round(self.lab.remote.delay / self.dt) + 1, count)
+        self._frames, self._commands = (  # the last values of all robots, the latest last
+            deque([np.zeros(count) for _ in range(length)], length)
+            for length in (late + slow + 1, round(self.lab.remote.delay / self.dt) + 1)
+        )
         self._sent: Samples = np.zeros(count)
         self._wander, self._scale, self._gain = np.zeros(count), np.ones(count), np.ones(count)
         self._pulse_start, self._pulse = np.zeros(count), np.zeros(count)
@@ -154,8 +136,8 @@ class TaskEnvironment(ABC):
         self.plants.redraw(which, rng)
         self.plants.reset(which)
         self.steps[which] = 0
-        self._frames.forget(which)
-        self._commands.forget(which)
+        for values in (*self._frames, *self._commands):
+            values[which] = 0.0
         self._sent[which] = 0.0
         self._wander[which] = rng.standard_normal(new)
         self._scale[which] = 1.0 + lab.camera.scale_error * rng.standard_normal(new)
@@ -171,8 +153,8 @@ class TaskEnvironment(ABC):
         """One frame; the reward of each robot: minus its score, times the step in s."""
         self._sent = self._duty(actions)
         lost = rng.random(self.count) < self.lab.remote.lost
-        self._commands.append(np.where(lost, self._commands.ago(0), self._sent))
-        self.plants.step(self.dt, duty=self._commands.ago(len(self._commands) - 1), flow=self._flow())
+        self._commands.append(np.where(lost, self._commands[-1], self._sent))
+        self.plants.step(self.dt, duty=self._commands[0], flow=self._flow())
         self.steps += 1
         self._film(rng)
         return -self.scores() * self.dt
@@ -220,12 +202,12 @@ class TaskEnvironment(ABC):
         kept = np.exp(-self.dt / camera.memory)
         self._wander = kept * self._wander + np.sqrt(1.0 - kept**2) * noise[1]
         place = self._scale * self.position + camera.position_noise * noise[0] + camera.position_wander * self._wander
-        self._frames.append(np.where(lost, self._frames.ago(0), place))
+        self._frames.append(np.where(lost, self._frames[-1], place))
 
     def _seen(self) -> tuple[Samples, Samples]:
         """Position and speed as the camera measures them now, m and m/s."""
-        last = self._frames.ago(self._late)
-        return last, (last - self._frames.ago(self._late + self._slow)) / (self._slow * self.dt)
+        last = self._frames[-1 - self._late]
+        return last, (last - self._frames[0]) / (self._slow * self.dt)
 
     def _time_left(self) -> Samples:
         return 1.0 - self.steps / self.length

@@ -279,16 +279,6 @@ def coil_curvature(wavelength: Values, amplitude: Values) -> Values:
     return amplitude * (2.0 * np.pi / wavelength) ** 2 * arc_fraction(wavelength, amplitude) ** 2
 
 
-def pitch_angle(wavelength: Values, amplitude: Values) -> Values:
-    """Angle between the wire and the tail's axis, rad; its cosine is alpha."""
-    return np.arctan(2.0 * np.pi * amplitude / wavelength)
-
-
-def arc_length(wavelength: Values, amplitude: Values, length: Values) -> Values:
-    """L = L_t/alpha: length of the wire of a plain helix, m."""
-    return length / arc_fraction(wavelength, amplitude)
-
-
 def amplitude_envelope(xi: Values, amplitude: Values, length: Values, taper: Values) -> tuple[Values, Values]:
     """Local amplitude of eq. (10), r = B_o (1 - exp(-c xi/L_t)), and its slope; c is infinite for a plain helix."""
     with np.errstate(invalid="ignore"):

@@ -115,13 +115,6 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
     return tuple(pieces)
 
 
-def _check_triangles(cause: str, rings: int, around: int) -> None:
-    """Refuse a surface of rings of so many vertices that does not fit into memory."""
-    check_memory(
-        cause, 2.0 * rings * around, "triangles", _TRIANGLE, "as with a smaller fineness or a longer wavelength"
-    )
-
-
 def _piece(
     name: str,
     part: Literal["body", "rotor"],
@@ -193,8 +186,9 @@ def _rotor(
         bar = rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)
         found += [("arm", copy) for copy in _around(bar, robot)]
     turns = robot.tail.length / robot.tail.wavelength
-    rings = robot.tail.starts * len(wire.points)
-    _check_triangles(f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})", rings, sides)
+    cause = f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})"
+    triangles = 2.0 * robot.tail.starts * len(wire.points) * sides
+    check_memory(cause, triangles, "triangles", _TRIANGLE, "as with a smaller fineness or a longer wavelength")
     found += [("tail", copy) for copy in _around(swept(wire.points, wire.tangents, radius, sides), robot)]
     return found
 

@@ -236,13 +236,19 @@ def sampled_discrepancy(
         return found
     values = np.stack([_compared(name, predicted, tail) for name in names])
     spread = np.stack([posterior.discrepancy[name] for name in names]) * values
-    errors = np.stack([_error_of(posterior.error[name], tail["seen"][name]) for name in names])
+    seen_of = [tail["seen"][name] for name in names]
+    errors = np.stack(
+        [
+            error_of_mean(posterior.error[name], one.get("stated", 0.0), one["scale"], one["trials"])
+            for name, one in zip(names, seen_of, strict=True)
+        ]
+    )
     noise = np.einsum("qd,rd->dqr", errors, errors) * _correlations(names, float(tail["correlation"]))
-    floor = np.array([float(tail["floor"]) * tail["seen"][name]["scale"] for name in names]) ** 2
+    floor = np.array([float(tail["floor"]) * one["scale"] for one in seen_of]) ** 2
     noise = noise + np.diag(floor)
     # Matheron's rule: a draw of the prior, moved by what its own observation differs from the one that was made.
     off = values * (np.stack([found[name] for name in names]) - 1.0)
-    seen = np.array([tail["seen"][name]["mean"] for name in names])[:, None]
+    seen = np.array([one["mean"] for one in seen_of])[:, None]
     error = np.einsum("dqr,rd->qd", np.linalg.cholesky(noise), rng.normal(size=off.shape))
     whole = noise + spread.T[:, :, None] ** 2 * np.eye(len(names))
     gain = spread.T[:, :, None] ** 2 * np.linalg.inv(whole)
@@ -266,10 +272,6 @@ def _compared(name: str, predicted: Mapping[str, Samples], tail: Mapping[str, ob
     if name == "advance" and tail["by_motor"]:
         return predicted["advance"] / (1.0 - predicted["turning"])
     return predicted[name]
-
-
-def _error_of(error: Samples, seen: Mapping[str, float]) -> Samples:
-    return error_of_mean(error, seen.get("stated", 0.0), seen["scale"], seen["trials"])
 
 
 def _correlations(names: list[str], correlation: float) -> Samples:

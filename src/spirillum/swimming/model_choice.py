@@ -53,24 +53,19 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
     names = fit.models
     if len(names) > 1:
         raise InputError(f"{fit.name} holds factors for models {', '.join(names)}; allowed: --model with one of them")
-    fitted = ModelChoice(names[0], fitted_with(fit.name), fitted=True) if names else None
-    if fitted is not None:
-        return fitted
+    if names:
+        return ModelChoice(names[0], fitted_with(fit.name), fitted=True)
     if robot.channel is None:
         return ModelChoice(UNBOUNDED, NO_CHANNEL)
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside and (placement is None or not placement.is_given):  # a pose is refused by the model that takes poses
-        others = (UNBOUNDED, *(name for name, model in SWIMMER_MODELS.items() if not model.placed))
-        instead = (f"; or model '{name}', which leaves out the walls" for name in others if _answers_for(batch, name))
         said = f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}"
-        raise InputError(said + next(instead, ""))
+        for name in (UNBOUNDED, *(name for name, model in SWIMMER_MODELS.items() if not model.placed)):
+            if not broken(requirements(batch, find_swimmer_model(name))):
+                raise InputError(f"{said}; or model '{name}', which leaves out the walls")
+        raise InputError(said)
     return ModelChoice(WALLED, IN_CHANNEL)
-
-
-def _answers_for(batch: RobotBatch, model: str) -> bool:
-    """Whether the first robot of a batch lies in the domain of a model."""
-    return not broken(requirements(batch, find_swimmer_model(model)))
 
 
 def models_without_answer(robot: Robot) -> list[str]:

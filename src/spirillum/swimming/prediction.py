@@ -22,27 +22,21 @@ from spirillum.fluid.tube.progress_messages import LEVEL, TILTED, solution_messa
 from spirillum.kernels.native import run_together
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import broken
+from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import Band, band_of
-from spirillum.swimming.cautions import (
-    accuracy_limits,
-    calibration_warnings,
-    drive_warnings,
-    film_limits,
-    no_band_warnings,
-)
-from spirillum.swimming.drawn_resistance import PosteriorFor
-from spirillum.swimming.model_choice import AUTO, ModelChoice
+from spirillum.swimming.cautions import no_band_warnings
+from spirillum.swimming.drawn_resistance import PosteriorFor, posterior_for_of
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.preparation import why_no_table
+from spirillum.swimming.preparation import prepared, why_no_table
 from spirillum.swimming.released_motion import Motion, ReleasedMotion, SteadyState, motion_of
-from spirillum.swimming.scenario import Scenario, resolve_scenario
-from spirillum.swimming.steady import STEADY, Intervals, Swimming, headline
-from spirillum.units import show
+from spirillum.swimming.scenario import Scenario
+from spirillum.swimming.steady import STEADY, Intervals, Swimming, friction_reading, headline
+from spirillum.units import KINDS, parse_option
 
 
 @dataclass(frozen=True, repr=False)
@@ -209,21 +203,31 @@ def predict(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot with fitted values `fit`; else arguments as of `spirillum.predict`."""
-    scenario = resolve_scenario(
-        robot,
-        model=model,
-        tail_rate=tail_rate,
-        friction=friction,
-        calibrated=calibrated,
-        fit=fit,
-        posterior_for=posterior_for,
-        resolution=resolution,
-        placement=placement,
-        motion=motion,
+    own, given, drawn = load(robot), Placement.of(placement), fit.posterior
+    central = own if drawn is None else fit.central(own)
+    where = fit.placed(central, given)
+    choice = model if isinstance(model, ModelChoice) else choose_model(model, central, placement=where, fit=fit)
+    ready, chosen, batch = prepared(
+        central, choice.model, fit=fit, resolution=resolution, placement=where if where.is_given else None
     )
+    reading = friction_reading(ready.friction.reading if friction is None else friction)
+    rate = _rate(tail_rate, batch.placement)
+    if rate is None and ready.drive is None:
+        raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
+    scenario = Scenario(
+        robot=ready,
+        model=chosen,
+        batch=batch,
+        friction=reading,
+        tail_rate=rate,
+        calibrated=calibrated,
+        motion=motion,
+        fit=fit,
+        names_friction=own.friction.effective is not None,
+    )
+    whose = posterior_for_of(posterior_for, drawn, ready)
     if band:
-        _check_band(scenario.choice.model)
-    ready, chosen, batch, drawn = scenario.robot, scenario.model, scenario.batch, scenario.fit.posterior
+        _check_band(choice.model)
     intervals, torque = None, []
     if drawn is not None:
         from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque  # loads compiled loops
@@ -232,10 +236,10 @@ def predict(
             ready,
             chosen,
             drawn,
-            tail_rate=scenario.tail_rate,
-            friction=scenario.friction,
-            posterior_for=scenario.posterior_for,
-            placement=scenario.placement,
+            tail_rate=rate,
+            friction=reading,
+            posterior_for=whose,
+            placement=given,
         )
         if not knows_torque(ready, chosen):
             intervals, torque = without_torque(intervals), [Note.named("torque-not-fitted")]
@@ -250,22 +254,22 @@ def predict(
     result = scenario.swim(batch)
     if not result.valid[0]:
         raise InputError(scenario.why_not(result))
-    warnings = [*ready.warnings, *_case_warnings(scenario, result)]
+    warnings = [*ready.warnings, *scenario.warnings(result)]
     error = scenario.error_estimate(result, checks)
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
     over = band_of(batch, chosen, result, scenario.swim, tell) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
-    if intervals is not None and scenario.posterior_for == "measured":
+    if intervals is not None and whose == "measured":
         result = with_middles(result, intervals)
-    acts = friction_acts(scenario.friction, scenario.tail_rate)
+    acts = friction_acts(reading, rate)
     idle = fit.outside_warnings(ready, chosen, friction=acts)
     if idle:
         intervals = None
-    warnings += idle or [*fit.answer_warnings(ready, chosen, scenario.friction, scenario.tail_rate), *torque]
+    warnings += idle or [*fit.answer_warnings(ready, chosen, reading, rate), *torque]
     return Prediction(
         robot=ready,
         model=chosen,
-        friction=scenario.friction,
+        friction=reading,
         calibrated=calibrated and chosen.name in ready.calibration,
         batch=batch,
         swimming=result,
@@ -274,29 +278,11 @@ def predict(
         intervals=intervals,
         band=over,
         motion=motion_of(motion),
-        interval_of="" if idle else interval_statement(drawn, ready, scenario.posterior_for),
-        choice=scenario.choice,
-        tail_rate=scenario.tail_rate,
+        interval_of="" if idle else interval_statement(drawn, ready, whose),
+        choice=choice,
+        tail_rate=rate,
         fitted_by="" if idle else fit.source_of(ready, chosen, friction=acts),
     )
-
-
-def _case_warnings(scenario: Scenario, result: Swimming) -> list[Note]:
-    """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out."""
-    robot, model, batch, rate = scenario.robot, scenario.model, scenario.batch, scenario.tail_rate
-    known = robot  # of the user's file: without the B_eff of a calibration
-    if rate and not scenario.names_friction:
-        known = robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
-    assumed = "assumed-on-floor" if robot.has_body else "assumed-on-axis"
-    return [
-        *(calibration_warnings(robot, model.name) if scenario.calibrated else ()),
-        *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
-        *(limit.caution() for limit in broken(film_limits(robot, model, batch, result))),
-        *drive_warnings(known, model, scenario.friction, result, rate),
-        *_free_warnings(robot, scenario.motion),
-        *([Note.named("in-a-flow")] if batch.placement.flow else []),
-        *([Note.named(assumed)] if model.placed and not scenario.has_weight_or_place() else []),
-    ]
 
 
 def free_in_tube(fitted_by: str) -> str:
@@ -326,6 +312,15 @@ def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: Pos
     )
 
 
+def _rate(value: str | float | None, placement: Placement) -> float | None:
+    if value is None:
+        return None
+    rate = parse_option("tail-rate", value, KINDS["rate"])
+    if rate == 0 and not placement.flow:
+        raise InputError("tail-rate = 0 Hz: a tail at rest drives nothing; allowed: any other rate")
+    return rate
+
+
 def _check_band(model: str) -> None:
     """Refuse a band of a model without a pose."""
     walled = [name for name, known in SWIMMER_MODELS.items() if known.placed]
@@ -334,16 +329,3 @@ def _check_band(model: str) -> None:
             f"band = True with model '{model}'; allowed: only with a model that computes the walls "
             f"({', '.join(walled)})"
         )
-
-
-def _free_warnings(robot: Robot, motion: str) -> list[Note]:
-    """What a free motion leaves out."""
-    if motion == "held":
-        return []
-    if robot.channel is not None:
-        return [Note.named("free-without-walls")]
-    weight = robot.derived().get("submerged_weight")
-    if weight is None or not weight.value:
-        return []
-    moves = "sinks" if weight.value > 0 else "rises"
-    return [Note.named("free-without-weight", weight=show(weight.value, "N"), moves=moves)]

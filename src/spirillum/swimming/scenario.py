@@ -1,30 +1,24 @@
-"""A request for a steady motion, resolved once: robot, pose, model, fit, drive and friction model."""
+"""A case of steady motion: robot, pose, model, fit, drive and friction model, its motion, errors and cautions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from spirillum.errors import InputError
-from spirillum.fitted.fit import NO_FIT, Fit
+from spirillum.fitted.fit import Fit
 from spirillum.fluid.model import SwimmerModel
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.load import load
-from spirillum.robot.model_options import Resolution
-from spirillum.robot.placement import Placement
+from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
-from spirillum.swimming.drawn_resistance import PosteriorFor, posterior_for_of
+from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, drive_warnings, film_limits
 from spirillum.swimming.dry_friction import swim_on_floor
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
-from spirillum.swimming.preparation import prepared
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.steady import Swimming, calibrated_balance, friction_reading, speed_error
-from spirillum.units import KINDS, parse_option
+from spirillum.swimming.steady import Swimming, calibrated_balance, speed_error
+from spirillum.units import show
 
 
 @dataclass(frozen=True)
@@ -45,12 +39,6 @@ class Scenario:
     """Lateral motion and tilt constrained (`held`), or `free`."""
     fit: Fit
     """Fitted values that act on the robot."""
-    choice: ModelChoice
-    """Why the model was taken."""
-    placement: Placement
-    """The requested placement, without fitted fields."""
-    posterior_for: PosteriorFor
-    """Whose discrepancy intervals contain."""
     names_friction: bool
     """Whether the robot itself, before the fit, states its effective friction."""
 
@@ -83,11 +71,38 @@ class Scenario:
             found = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
         return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
 
-    def has_weight_or_place(self) -> bool:
+    def _has_weight_or_place(self) -> bool:
         """Whether it is known that the robot's weight keeps it on the floor, or where else it is."""
         place = self.batch.placement
         known = self.robot.body.mass is not None and self.robot.tail.density is not None
         return known or place.gap is not None or place.eccentricity is not None
+
+    def warnings(self, result: Swimming) -> list[Note]:
+        """What to be careful about: calibration, accuracy, drive, what a free motion leaves out."""
+        robot, model, batch, rate = self.robot, self.model, self.batch, self.tail_rate
+        known = robot  # of the user's file: without the B_eff of a calibration
+        if rate and not self.names_friction:
+            known = robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
+        assumed = "assumed-on-floor" if robot.has_body else "assumed-on-axis"
+        return [
+            *(calibration_warnings(robot, model.name) if self.calibrated else ()),
+            *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
+            *(limit.caution() for limit in broken(film_limits(robot, model, batch, result))),
+            *drive_warnings(known, model, self.friction, result, rate),
+            *(self._left_out() if self.motion == "free" else ()),
+            *([Note.named("in-a-flow")] if batch.placement.flow else []),
+            *([Note.named(assumed)] if model.placed and not self._has_weight_or_place() else []),
+        ]
+
+    def _left_out(self) -> list[Note]:
+        """What a free motion leaves out."""
+        if self.robot.channel is not None:
+            return [Note.named("free-without-walls")]
+        weight = self.robot.derived().get("submerged_weight")
+        if weight is None or not weight.value:
+            return []
+        moves = "sinks" if weight.value > 0 else "rises"
+        return [Note.named("free-without-weight", weight=show(weight.value, "N"), moves=moves)]
 
     def why_not(self, result: Swimming) -> str:
         """Why there is no steady motion."""
@@ -108,55 +123,3 @@ class Scenario:
                 f"E_x = {limit:.4g} N m s/rad with friction model 'paper', which would turn the tail backwards"
             )
         return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
-
-
-def resolve_scenario(
-    robot: str | Path | Mapping[str, Any] | Robot,
-    *,
-    model: str | ModelChoice = AUTO,
-    tail_rate: str | float | None = None,
-    friction: str | None = None,
-    calibrated: bool = True,
-    fit: Fit = NO_FIT,
-    posterior_for: str = "new",
-    resolution: Resolution | Mapping[str, Any] | None = None,
-    placement: Placement | Mapping[str, Any] | None = None,
-    motion: str = "held",
-) -> Scenario:
-    """Return the scenario of a request; the arguments are those of `spirillum.swimming.prediction.predict`."""
-    own, given = load(robot), Placement.of(placement)
-    central = own if fit.posterior is None else fit.central(own)
-    where = fit.placed(central, given)
-    choice = model
-    if not isinstance(choice, ModelChoice):
-        choice = choose_model(choice, central, placement=where, fit=fit)
-    ready, chosen, batch = prepared(
-        central, choice.model, fit=fit, resolution=resolution, placement=where if where.is_given else None
-    )
-    reading = friction_reading(ready.friction.reading if friction is None else friction)
-    rate = _rate(tail_rate, batch.placement)
-    if rate is None and ready.drive is None:
-        raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
-    return Scenario(
-        robot=ready,
-        model=chosen,
-        batch=batch,
-        friction=reading,
-        tail_rate=rate,
-        calibrated=calibrated,
-        motion=motion,
-        fit=fit,
-        choice=choice,
-        placement=given,
-        posterior_for=posterior_for_of(posterior_for, fit.posterior, ready),
-        names_friction=own.friction.effective is not None,
-    )
-
-
-def _rate(value: str | float | None, placement: Placement) -> float | None:
-    if value is None:
-        return None
-    rate = parse_option("tail-rate", value, KINDS["rate"])
-    if rate == 0 and not placement.flow:
-        raise InputError("tail-rate = 0 Hz: a tail at rest drives nothing; allowed: any other rate")
-    return rate

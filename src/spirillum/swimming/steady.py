@@ -233,10 +233,9 @@ def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
 
 def friction_reading(name: str) -> FrictionReading:
     """The reading of that name."""
-    for reading in get_args(FrictionReading):
-        if name == reading:
-            return cast("FrictionReading", reading)
-    raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionReading))}")
+    if name not in get_args(FrictionReading):
+        raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionReading))}")
+    return cast("FrictionReading", name)
 
 
 def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:

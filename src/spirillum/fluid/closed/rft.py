@@ -15,7 +15,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values
 from spirillum.envelope import quantity
 from spirillum.fluid.algebra import both_parts, dyad, joint_locked, skew, two_parts_axial
 from spirillum.fluid.closed.perrin import body_axial, body_matrix
-from spirillum.fluid.closed.thin_wire import thin_wire_cautions
+from spirillum.fluid.closed.sbt import thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import (
     CHECKED,
@@ -156,7 +156,8 @@ def _wire_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
     }
     columns = {name: column[:, None] for name, column in columns.items()}
     line = centreline(fraction * columns["length"], form=b.form, **columns)
-    ds = weight * columns["length"] * (line.stretch if _has_true_arc(b) else 1.0 / b.arc_fraction[:, None])
+    own_arc = b.options.rft.arc_element == "true" or not b.form.is_helix  # (l/L_t) dx is that of one helix
+    ds = weight * columns["length"] * (line.stretch if own_arc else 1.0 / b.arc_fraction[:, None])
     c = local_coefficients(batch)
     normal, tangential = c.normal[:, None, None, None], c.tangential[:, None, None, None]
     local: Tensors = normal * np.eye(3) + (tangential - normal) * dyad(line.tangent)
@@ -171,11 +172,6 @@ def _wire_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
         lower[..., 3:] += _spin_coefficient(b)[:, None, None, None] * dyad(line.tangent)
     total: Matrix6 = np.einsum("...i,...ijk->...jk", ds, np.concatenate([upper, lower], axis=-2))
     return total
-
-
-def _has_true_arc(batch: RobotBatch) -> bool:
-    """Whether the arc element is the wire's own: (l/L_t) dx is that of one helix."""
-    return batch.options.rft.arc_element == "true" or not batch.form.is_helix
 
 
 def _along_the_wire(batch: RobotBatch) -> tuple[Values, Values]:
@@ -207,17 +203,15 @@ class _Integrand(NamedTuple):
 
 def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
     """(B11, B14, B44) of eq. (12), averaged over the tail's phase where a floor makes them depend on it."""
-    one = _helix_axial(batch) if batch.form.is_helix else _wire_axial(batch)
+    if batch.form.is_helix:
+        one = _helix_axial(batch)
+    else:
+        phases = _FLOOR_PHASES if batch.options.rft.coefficients == "brennen-winet" else 1
+        turns = 2.0 * np.pi * np.arange(phases) / phases
+        matrix = np.mean([_wire_matrix(batch, np.full(1, turn)) for turn in turns], axis=0)
+        one = matrix[:, 0, 0], matrix[:, 0, 3], matrix[:, 3, 3]
     drag, coupling, rotation = (batch.form.starts * entry for entry in one)
     return drag, coupling, rotation
-
-
-def _wire_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
-    """Of a wire of any form; with a floor averaged over phases."""
-    phases = _FLOOR_PHASES if batch.options.rft.coefficients == "brennen-winet" else 1
-    turns = 2.0 * np.pi * np.arange(phases) / phases
-    matrix = np.mean([_wire_matrix(batch, np.full(1, turn)) for turn in turns], axis=0)
-    return matrix[:, 0, 0], matrix[:, 0, 3], matrix[:, 3, 3]
 
 
 def _helix_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:

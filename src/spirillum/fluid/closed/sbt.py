@@ -20,7 +20,6 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples, Values
 from spirillum.data_tables import rows_of
 from spirillum.fluid.algebra import two_parts_axial
 from spirillum.fluid.closed.perrin import body_axial
-from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT, cutoff, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import (
     CHECKED,
@@ -86,6 +85,28 @@ def _expansion(alpha: Samples) -> Samples:
 def _stretched(alpha: Samples) -> Samples:
     """The variable in which the expansion converges fast: singularities sit near alpha = 0, off the real axis."""
     return np.log(alpha / (1.0 + alpha / 2.0))
+
+
+PRINTED_EPS_CONSTANT = 2.6
+"""Constant of eps as the paper prints it."""
+EXACT_EPS_CONSTANT = 0.5 * np.pi * np.exp(0.5)
+"""pi sqrt(e)/2 = 2.58981: Lighthill's cut-off delta = a sqrt(e)/2 (SIAM Rev. 18:161, 1976)."""
+
+_LARGEST_EPS = 0.2
+_FEWEST_TURNS = 1.0
+
+
+def cutoff(batch: RobotBatch, constant: float) -> PerRobot:
+    """Eps = k delta = constant alpha D_t/lambda, with k the wavenumber along the wire (Section II-B)."""
+    return constant * batch.arc_fraction * batch.wire_diameter / batch.wavelength
+
+
+def thin_wire_cautions(batch: RobotBatch, constant: float) -> list[Limit]:
+    """Where what the theories neglect, of order eps^2, exceeds some 4 %, or the helix has no full turn."""
+    return [
+        Limit.named("thin-wire", cutoff(batch, constant), _LARGEST_EPS),
+        Limit.named("whole-turns", batch.tail_length / batch.wavelength, _FEWEST_TURNS),
+    ]
 
 
 class HelixFunctions(NamedTuple):

@@ -117,11 +117,16 @@ def built_tables(
     workers: int = 2,
     progress: Progress | None = None,
 ) -> list[TubeTable]:
-    """Solve for the flow at every place of a stage, for every robot, and make their tables."""
+    """Solve for the flow at every place of a stage, for every robot, and make their tables.
+
+    Tables for whose nodes the memory does not suffice are refused before the first is solved for.
+    """
     requests = [_Request.of(Places(geometry, radius, stage)) for geometry, radius in robots]
     wanted = [pose for request in requests for pose in request.poses]
-    for request in requests:
-        _check_memory(request.places.geometry, request.nodes)
+    for request in requests:  # a level node stands for the tilted ones with its gap, and one with yaw for all of them
+        yawed = [node for node in request.nodes if node.pose.yaw]  # that nearest to the glass first
+        for node in (*(node for node in request.nodes if node.pose.level), *yawed[:1]):
+            check_solvable(request.places.geometry, node.pose, node.fineness)
     if progress is not None:
         count, kept = _solved_before(wanted)
         progress(progress_message(count, workers, kept, stage.seconds), 0, count)
@@ -185,7 +190,8 @@ def _table(request: _Request, found: Sequence[Sequence[Samples]]) -> TubeTable:
     without = _largest_errors(packed, request.straight, found[:level])
     error = _largest_errors(packed, request.yawed, found[level:count]) if request.yawed else without
     nodes, stage = len(request.nodes), places.stage.name
-    return TubeTable(places.geometry, places.radius, packed, error, without, nodes, 0.0, _wire(places), stage)
+    wire = 0.0 if finest_wire(places.geometry) == "high" else None  # None: the largest error that was measured
+    return TubeTable(places.geometry, places.radius, packed, error, without, nodes, 0.0, wire, stage)
 
 
 def _definite(
@@ -216,11 +222,6 @@ def _is_definite(film: Samples, node: _Place, answers: Sequence[Samples]) -> boo
     )
 
 
-def _wire(places: Places) -> float | None:
-    """None for the form of the wire: its error is then the largest that was measured."""
-    return 0.0 if finest_wire(places.geometry) == "high" else None
-
-
 def _film_of_table(places: Places) -> Samples:
     """Packed film of a robot's body in its tube."""
     stage = places.stage
@@ -246,24 +247,6 @@ def _nodes(places: Places) -> list[NodeSolution]:
         for place in _yawed(places)
     ]
     return level + yawed
-
-
-def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> None:
-    """Refuse a table for whose nodes the memory does not suffice, before the first is solved for.
-
-    The level node of each gap stands for the tilted ones with it, and the first with yaw, nearest to the glass, for all
-    with yaw.
-    """
-    level = [node for node in nodes if node.pose.level]
-    for node in (*level, *[node for node in nodes if node.pose.yaw][:1]):
-        check_solvable(geometry, node.pose, node.fineness)
-
-
-def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
-    """The packed table from the answers to `_nodes`."""
-    count = len(_level(places))
-    film = _film_of_table(places)
-    return _assembled(places, film, [place[0] for place in found[:count]], found[count:])
 
 
 class _Place(NamedTuple):
@@ -311,10 +294,13 @@ def _film_of(film: Samples, pose: TubePose) -> Samples:
     return out
 
 
-def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: Sequence[Sequence[Samples]]) -> Samples:
-    """The packed table from the 8x8 at its nodes, and at those with yaw of the robot and of its mirror image."""
-    starts = places.geometry.form.starts
-    rest = [rest_at(m, _film_of(film, n.pose), n.t, n.pose, starts) for n, m in zip(_level(places), level, strict=True)]
+def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
+    """The packed table from the answers to `_nodes`: with yaw of the robot and of its mirror image."""
+    starts, film, level = places.geometry.form.starts, _film_of_table(places), _level(places)
+    rest = [
+        rest_at(own, _film_of(film, node.pose), node.t, node.pose, starts)
+        for node, (own, *_) in zip(level, found[: len(level)], strict=True)
+    ]
     most = places.most[-1]
     on_axis = OnAxis.of(places.up * most[0], np.stack(rest[-len(places.up) :]))
     rest += [on_axis.coefficients(float(-f * most[1])) for f in places.down[1:]]
@@ -324,15 +310,15 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     if not places.stage.yawed:
         return kernel.packed(places.radius, places.rings, *parts, none, none, _NO_YAW, none, film)
     straight = kernel.packed(places.radius, places.rings, *parts, none, none, places.yaw_limit, none, film)
-    sides = [_both_sides(film, place, starts, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
+    yawed = zip(_yawed(places), found[len(level) :], strict=True)
+    sides = [_both_sides(film, place, starts, *answers) for place, answers in yawed]
     for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
         pitch = float(f * (most[0] if f >= 0 else most[1]))
         for share in kernel.YAW_SHARES:
             here = share * float(yaw)
             sides.append((on_axis.coefficients(pitch, here), on_axis.coefficients(pitch, -here)))
     of_node = np.reshape(sides, (-1, len(kernel.YAW_SHARES), *np.shape(sides)[1:]))
-    poses = _yawed_poses(places)
-    middles = [_interpolated(straight, pose, of_node.shape[-2]) for pose in poses]
+    middles = [_interpolated(straight, pose, of_node.shape[-2]) for pose in places.yaw_poses]
     turned = np.stack([_powers(middle, node) for middle, node in zip(middles, of_node, strict=True)])
     yawed_nodes = places.yaw_gaps, places.yaw_pitches, places.yaw_limit
     return kernel.packed(places.radius, places.rings, *parts, *yawed_nodes, turned, film)
@@ -350,11 +336,6 @@ def _both_sides(film: Samples, place: _Place, starts: int, own: Samples, image: 
     back = replace(place.pose, yaw=-place.pose.yaw)
     left = rest_at(own, _film_of(film, place.pose), place.t, place.pose, starts)
     return left, rest_at(seen_in_mirror(image), _film_of(film, back), place.t, back, starts)
-
-
-def _yawed_poses(places: Places) -> list[TubePose]:
-    """Poses of all nodes with yaw, with their yaw set to zero."""
-    return [places.pose(float(t), float(f)) for t in places.yaw_gaps for f in places.yaw_pitches]
 
 
 def _interpolated(straight: Samples, pose: TubePose, count: int) -> Samples:

@@ -144,11 +144,15 @@ class Places:
         return np.array(_YAW_PITCHES)
 
     @cached_property
+    def yaw_poses(self) -> list[TubePose]:
+        """Poses of all nodes with yaw, with their yaw set to zero."""
+        return [self.pose(float(t), float(f)) for t in self.yaw_gaps for f in self.yaw_pitches]
+
+    @cached_property
     def yaw_limit(self) -> Samples:
         """Numbers of `limited_yaw`: the tail is then off the glass as elsewhere."""
-        poses = [self.pose(float(t), float(f)) for t in self.yaw_gaps for f in self.yaw_pitches]
-        x, pitches = np.array([(pose.offset / self.radius, pose.pitch) for pose in poses]).T
-        return yaw_limit_of(x, pitches, np.array([self._widest(pose) for pose in poses]), LARGEST_YAW)
+        x, pitches = np.array([(pose.offset / self.radius, pose.pitch) for pose in self.yaw_poses]).T
+        return yaw_limit_of(x, pitches, np.array([self._widest(pose) for pose in self.yaw_poses]), LARGEST_YAW)
 
     def fineness(self, t: float, pose: TubePose, *, check: bool = False, stage: Stage | None = None) -> Fineness:
         """Resolution of the flow at a node, or at a check pose, of this stage or of another one."""

@@ -264,13 +264,10 @@ class Solids:
         """Tractions for `motion`."""
         return self.solve(self.motion)
 
-    def wrenches(self, tractions: Sequence[Samples], against: Sequence[Samples] | None = None) -> Samples:
-        """Work of tractions, even and odd, against velocities, or else against `motion`, (13 or m, n)."""
-        velocities = self.motion if against is None else against
-        total: Samples = np.sum(
-            [v.T @ (rows.dual[:, None] * f) for rows, v, f in zip(self.rows, velocities, tractions, strict=True)],
-            axis=0,
-        )
+    def wrenches(self, tractions: Sequence[Samples]) -> Samples:
+        """Work of tractions, even and odd, against `motion`, (13, n)."""
+        halves = zip(self.rows, self.motion, tractions, strict=True)
+        total: Samples = np.sum([v.T @ (rows.dual[:, None] * f) for rows, v, f in halves], axis=0)
         return total
 
 

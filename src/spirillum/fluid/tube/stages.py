@@ -67,7 +67,8 @@ class Stage:
         """Return the resolution of a node, or of a check pose, whose level gap is given."""
         near: Where = "near" if level_gap < _NEAR * body_radius else "far"
         where: Where = "tight" if body_radius > _TIGHT * pose.radius else near
-        return (self.checks if check else self.resolutions)[where, _tilt_of(pose)]
+        tilt: Tilt = "level" if pose.level else "yawed" if pose.yaw else "pitched"
+        return (self.checks if check else self.resolutions)[where, tilt]
 
     def phases_at(self, clearance: float) -> int:
         """Number of phases of a tail with that clearance over the radius that it sweeps."""
@@ -136,14 +137,9 @@ STAGES: dict[StageName, Stage] = {stage.name: stage for stage in (STRAIGHT, YAW,
 
 def stage_of(name: str) -> StageName:
     """Return the name of a stage that a user gives."""
-    for known in STAGES:
-        if name == known:
-            return known
-    raise InputError(f"stage = {name[:40]!r}{did_you_mean(name[:40], STAGES)}; allowed: {', '.join(STAGES)}")
-
-
-def _tilt_of(pose: TubePose) -> Tilt:
-    return "level" if pose.level else "yawed" if pose.yaw else "pitched"
+    if name not in STAGES:
+        raise InputError(f"stage = {name[:40]!r}{did_you_mean(name[:40], STAGES)}; allowed: {', '.join(STAGES)}")
+    return name
 
 
 RESPONSES = {

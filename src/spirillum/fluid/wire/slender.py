@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
-from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
+from spirillum.fluid.closed.sbt import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import CHECKED, validation_note, walls_left_out
 from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
@@ -44,9 +44,9 @@ _CHECKS = {  # what differs most from each: the form of the wire, and the spacin
 }
 
 
-def robot_solution(batch: RobotBatch, index: int = 0) -> UnitTwistSolution:
-    """Tractions on robot number `index` for all unit twists, at phase 0."""
-    return _solved(RobotGeometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
+def robot_solution(batch: RobotBatch) -> UnitTwistSolution:
+    """Tractions on the first robot of a batch for all unit twists, at phase 0."""
+    return _solved(RobotGeometry.of(batch), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
 
 
 def _solved(g: RobotGeometry, part: str, resolution: Discretisation) -> UnitTwistSolution:

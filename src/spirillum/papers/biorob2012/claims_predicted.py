@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Values
-from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
+from spirillum.fluid.closed.sbt import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
 from spirillum.papers.biorob2012 import claims_swimming
 from spirillum.papers.biorob2012.evidence import (
     BODY_DRAG_FACTORS,
