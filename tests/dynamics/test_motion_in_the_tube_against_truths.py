@@ -17,7 +17,7 @@ from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import run_answer
 from spirillum.dynamics.start import released_state, state_at_release
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube, read_flow
+from spirillum.dynamics.tube_options import InTube, Release, read_flow
 from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube
@@ -542,7 +542,7 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     asked = InTube.of({"azimuth": "20 deg", "wait": "2 s", "friction_coefficient": 0.2, "flow": file})
     placed = Placement.of({"gap": "0.3 mm", "yaw": "1 deg", "pitch": "-0.5 deg"})
     times = Timing(duration="2 s")
-    found = run_in_tube(steady, table, times, placed, asked, 1e-4, Field(), True, None)
+    found = run_in_tube(steady, table, times, Release(placed, asked, 1e-4), Field(), None)
     np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], [0, 1, 2], [0, 2e-3, -1e-3]), atol=1e-15)
     assert found.attrs["ends"] == "imposed flow"
     assert run_answer(found)["in_tube"]["mean_flow"]["value"] == pytest.approx(0.75e-3, rel=1e-3)
@@ -554,16 +554,16 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     assert float(found["electrical_energy"][0]) == 0.0
     assert "Reynolds" not in found.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n0,0\n2,-40\n")
-    fast = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
+    fast = run_in_tube(steady, table, Timing(duration="0.01 s"), Release(placed, InTube(flow=file)), Field(), None)
     assert "Reynolds number (imposed flow, body diameter) = 0.2" in fast.attrs["warnings"]
     assert "begins at" not in fast.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n1,0\n2,1\n")
-    late = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
+    late = run_in_tube(steady, table, Timing(duration="0.01 s"), Release(placed, InTube(flow=file)), Field(), None)
     assert f"{file} begins at 1 s, and the run ends at 0.01 s" in late.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n0,0\n0.005,1\n")
-    early = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
+    early = run_in_tube(steady, table, Timing(duration="0.01 s"), Release(placed, InTube(flow=file)), Field(), None)
     assert f"{file} ends at 0.005 s, and the run at 0.01 s: from then on" in early.attrs["warnings"]
-    open_ended = run_in_tube(steady, table, times, placed, InTube(), None, Field(), True, None)
+    open_ended = run_in_tube(steady, table, times, Release(placed, InTube()), Field(), None)
     assert "mean_flow" not in run_answer(open_ended)["in_tube"]
     assert open_ended.attrs["ends"] == "open"  # the channel has a length
     for text, words in (

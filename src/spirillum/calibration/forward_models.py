@@ -24,7 +24,7 @@ import numpy as np
 from spirillum.arrays import PerRobot, Samples, Values
 from spirillum.calibration.experiment import Experiment
 from spirillum.dynamics.trial import quick_run, trial_means
-from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, prepared_tables, tables_of
@@ -353,7 +353,7 @@ def _measured(robot: Robot, table: TubeTable, values: Mapping[str, float]) -> tu
     if "shared_friction" in values:
         robot = with_numbers(robot, {"friction.effective": values["shared_friction"]})
     try:
-        trial = trial_means(quick_run(robot, table, placed, asked, values.get("roughness"))).values
+        trial = trial_means(quick_run(robot, table, Release(placed, asked, values.get("roughness")))).values
     except InputError:
         return (np.nan, np.nan, np.nan)
     tail = trial["tail_rotation_rate"]

@@ -154,7 +154,7 @@ def intervals_of_free_motion(
     found: FreeMotion, posterior: PosteriorFile, *, posterior_for: PosteriorFor, progress: Progress | None = None
 ) -> Intervals:
     """95 % intervals of a steady free motion, the model's discrepancy included."""
-    lying, robot = found.run.lying, found.prediction.robot
+    lying, robot, reading = found.run.lying, found.prediction.robot, found.prediction.friction
     if lying.state != "steady":
         raise InputError(
             f"posterior with motion 'free': its median reaches no steady motion ({lying.statement}); allowed: motion "
@@ -167,7 +167,8 @@ def intervals_of_free_motion(
     for number, (index, one) in enumerate(zip(indices, posterior.drawn(unbound, DRAWS, rng), strict=True)):
         if progress is not None:
             progress("draws of the posterior", number, len(indices))
-        held, links = prepare_release(one, found.release._replace(contact=posterior.contact(index)))
+        release = found.release.with_contact(posterior.contact(index))
+        held, links = prepare_release(one, found.robot.table, release, found.prediction.tail_rate, reading)
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
         if fixed is None or abs(fixed.multiplier) > STABLE:
             continue
@@ -184,7 +185,6 @@ def intervals_of_free_motion(
     kept = posterior.at(steady)
     batch = sampled_batch(robot, kept.model, kept.of(robot, rng), kept.count)
     own_drive = found.prediction.tail_rate is None
-    reading = found.prediction.friction
     return intervals_over(
         whole, batch, kept, robot, rng, own_drive=own_drive, friction=reading, posterior_for=posterior_for
     )

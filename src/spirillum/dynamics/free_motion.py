@@ -20,7 +20,7 @@ from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.start import released_state
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
-from spirillum.dynamics.tube_options import InTube, with_contact
+from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import (
     Checked,
@@ -30,9 +30,7 @@ from spirillum.dynamics.tube_simulation import (
     sticking_notes,
 )
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
-from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.robot.fields import field_values
@@ -46,7 +44,7 @@ from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import prepared, table_for
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
 from spirillum.swimming.steady import Swimming, swimming_of
-from spirillum.units import KINDS, parse_option, show
+from spirillum.units import show
 
 _SAMPLES = 240
 """Samples of a turn over which means are taken."""
@@ -55,25 +53,6 @@ _FEW_TURNS = 6
 """Turns of the tail within which a trial reaches its steady motion."""
 _LIGHT = 1e-9
 """Weight in the fluid, over the forces that act, below which a robot has none."""
-
-
-class Release(NamedTuple):
-    """Release of a robot in its tube, its drive, and its contact."""
-
-    table: TubeTable
-    placement: Placement
-    in_tube: InTube
-    """Requested azimuth and dry friction."""
-    roughness: float | None
-    """Requested height of the asperities, m; None: the fitted one, or 1e-4 of the body's radius."""
-    contact: FittedContact
-    """Roughness and dry friction of a calibration, or of a draw of its posterior."""
-    tail_rate: str | float | None
-    """Lab rate of the tail; None: the robot's drive decides."""
-    friction: str | None
-    """Reading of the friction; None: the robot's own."""
-    weight: bool
-    """Whether weight and buoyancy act."""
 
 
 class FreeMotion(NamedTuple):
@@ -88,6 +67,7 @@ class FreeMotion(NamedTuple):
     start_gap: float
     """Smallest distance between body and wall at release, m."""
     release: Release
+    """As requested, without what is fitted of the contact."""
     checked: Checked
     """Whether its table was checked at this pose."""
 
@@ -107,30 +87,27 @@ def free_motion(
     progress: Progress | None = None,
 ) -> FreeMotion:
     """Follow a robot after release in its tube to its steady motion, or to the gap `until`; otherwise as `settle`."""
-    placed, requested = Placement.of(placement), InTube.of(in_tube)
-    height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
-    for item in field_values(requested):
+    requested = Release.of(placement, in_tube, roughness, weight=weight)
+    for item in field_values(requested.in_tube):
         if item.path in ("wait", "flow") and item.value is not None:
             raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
     own = load(robot)
-    contact = fit.contact()
     if fit.posterior is not None:
         own = fit.central(own)
-        placed = fit.placed(own, placed)
-    ready, _, batch = prepared(own, "tube", fit=fit, placement=placed)
+        requested = requested._replace(placement=fit.placed(own, requested.placement))
+    ready, _, batch = prepared(own, "tube", fit=fit, placement=requested.placement)
     if batch.drive == "magnetic":
         raise InputError(
             "drive.kind = 'magnetic': the motion depends on the phase of the field; allowed: drive.kind = "
             "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
         )
-    rough, touching = with_contact(contact, height, requested)
-    check_in_tube(ready, placed, touching, rough)
+    release = requested.with_contact(fit.contact())
+    check_in_tube(ready, release)
     if ready.channel is not None:
-        _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
+        _check_until(until, gap_of(release.placement, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
-    release = Release(table, placed, requested, height, contact, tail_rate, friction, weight)
-    held, links = prepare_release(ready, release)
-    state = released_state(ready, links, placed, touching.azimuth)
+    held, links = prepare_release(ready, table.packed, release, tail_rate, friction)
+    state = released_state(ready, links, release.placement, release.in_tube.azimuth)
     gap = float(observed_at(links, state)[core.SEEN_FILM])
     _check_until(until, gap)
     load_size = abs(float(links.weight[: core.WEIGHT_MOMENT_BODY].sum())) * links.length
@@ -166,21 +143,15 @@ def free_motion(
     source = fit.source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
     found = replace(found, lying=run.lying)
-    return FreeMotion(found, run, links, gap, release, checked)
+    return FreeMotion(found, run, links, gap, requested, checked)
 
 
-def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot]:
-    """The robot held at its initial pose, and the coefficients of its rates with its drive on."""
-    rough, touching = with_contact(release.contact, release.roughness, release.in_tube)
-    held = predict(
-        robot,
-        model="tube",
-        tail_rate=release.tail_rate,
-        friction=release.friction,
-        placement=release.placement,
-        band=False,
-    )
-    links = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
+def prepare_release(
+    robot: Robot, table: Samples, release: Release, tail_rate: str | float | None, friction: str | None
+) -> tuple[Prediction, TubeRobot]:
+    """The robot held at its initial pose, and the coefficients of its rates with its drive on, by its packed table."""
+    held = predict(robot, model="tube", tail_rate=tail_rate, friction=friction, placement=release.placement, band=False)
+    links = links_in_tube(held, table, release)
     if held.tail_rate is None:
         drive = held.robot.drive
         return held, links.at_duty(1.0 if drive is None else drive.duty)

@@ -37,14 +37,13 @@ from spirillum.dynamics.start import (
     resting_state,
 )
 from spirillum.dynamics.timing import Switch
-from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.errors import InputError, clipped
 from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
@@ -141,52 +140,50 @@ class Plant:
         Raises:
             InputError: for wrong input, or a robot or a pose outside the model's domain.
         """
-        placed, requested = Placement.of(placement), InTube.of(in_tube)
-        height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
+        release = self._release = Release.of(placement, in_tube, roughness, weight=weight)
         own = load(robot)
         if own.drive is None:
             raise InputError(f"{own.name} has no [drive]; allowed: a robot with one")
         fit = read_fit(calibration)
-        chosen = choose_model(model, own, placement=placed, fit=fit)
+        chosen = choose_model(model, own, placement=release.placement, fit=fit)
         walled = chosen.model == "tube"
         if not walled:
             check_full(find_swimmer_model(chosen.model))
-        if requested.wait:
+        if release.in_tube.wait:
             raise InputError("in_tube.wait is given to a plant; allowed: a step with the remote off")
-        if not walled and requested != InTube():
+        if not walled and release.in_tube != InTube():
             raise InputError(f"in_tube is given with model '{chosen.model}'; allowed: only with model 'tube'")
         if walled:
-            check_in_tube(own, placed, requested, height)
+            check_in_tube(own, release)
         self.steady: Prediction = predict(
             own,
             model=chosen,
             friction=friction,
             calibrated=calibrated,
             fit=fit,
-            placement=placed if walled else None,
+            placement=release.placement if walled else None,
             band=False,
         )
         """The steady state of the robot held where it starts, by the same model."""
         self.warnings: tuple[Note, ...] = self.steady.warnings
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
-        self._placed, self._requested, self._height, self._weight = placed, requested, height, weight
-        self._table = table_for(RobotBatch.of(own, placed), progress=progress) if walled else None
+        self._table = table_for(RobotBatch.of(own, release.placement), progress=progress).packed if walled else None
         self._reach = reach_of(own)
         self._links: FreeRobot
         if self._table is None:
-            self._links = without_walls = links_without_walls(self.steady, height, weight=weight)
-            first = resting_state(own, without_walls, placed)
+            self._links = without_walls = links_without_walls(self.steady, release.roughness, weight=weight)
+            first = resting_state(own, without_walls, release.placement)
         else:
-            self._links = links = self._in(self._table, placed)
-            first = released_state(own, links, placed, requested.azimuth)
+            self._links = links = links_in_tube(self.steady, self._table, release)
+            first = released_state(own, links, release.placement, release.in_tube.azimuth)
         on = own.drive.duty
         self._first = PlantState(
             time=0.0,
             state=tuple(first.tolist()),
             duty=on,
             command=on,
-            flow=placed.flow,
+            flow=release.placement.flow,
             field=TurningField.of(self._links),
             spent=False,
             ended="",
@@ -379,11 +376,9 @@ class Plant:
             if velocity is not None:
                 raise InputError("flow is known only to model 'tube'; allowed: another model, or no flow")
             return
-        links = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
+        placed = self._release.placement.model_copy(update={"flow": velocity})
+        links = links_in_tube(self.steady, self._table, self._release._replace(placement=placed))
         self._links = links if self._now.field is None else self._now.field.on(links)
-
-    def _in(self, table: TubeTable, placed: Placement) -> TubeRobot:
-        return links_in_tube(self.steady, table, placed, self._requested, self._height, weight=self._weight)
 
     def _commanded(self, *, remote: bool | None, duty: float | None) -> float:
         """Commanded duty."""

@@ -17,7 +17,7 @@ from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_fie
 from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.dynamics.start import links_without_walls, reach_of, resting_state, turning_rate
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
+from spirillum.dynamics.tube_options import InTube, Release, check_not_resolved
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, NO_FIT, Fit, read_fit
@@ -39,7 +39,7 @@ from spirillum.swimming.preparation import table_for
 from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.steady import friction_reading, requirements
-from spirillum.units import KINDS, as_given, parse_option
+from spirillum.units import as_given
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,12 +108,12 @@ def simulate(  # noqa: PLR0913 - the options of the command
     """
     fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated, answer=None)
     known = fit.posterior
-    placed, times = Placement.of(placement), Timing.of(timing)
+    release, times = Release.of(placement, in_tube, roughness, weight=weight), Timing.of(timing)
+    placed, requested = release.placement, release.in_tube
     times.check()
     number = sample_count(draws, known)
     if friction is not None:
         friction_reading(friction)
-    height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     own = load(robot)
     central = own if known is None else known.central(own)
     contact = fit.contact()
@@ -121,7 +121,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     model = choice.model
     fit, idle = fit.acting_on(central, find_swimmer_model(model))
     known, notes = fit.posterior, [*notes, *idle]
-    held, requested, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
+    held, about = motion_of(motion) == "held", Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
     walled = model == "tube" and not held
@@ -133,13 +133,13 @@ def simulate(  # noqa: PLR0913 - the options of the command
     _check_in_tube(requested, model, walled=walled, drawn=known is not None)
     if walled:
         check_not_resolved(own, resolution)
-        requested, times = requested.of_trial(placed), times.of_trial()
+        release, times = release._replace(in_tube=requested.of_trial(placed)), times.of_trial()
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None
-        there = placed if drawn is None else drawn.placed(one, placed, draw)
-        rough, touching = with_contact(contact if drawn is None else drawn.contact(draw), height, requested)
-        table = _table(one, there, touching, rough, tell) if walled else None
+        there = release.with_contact(contact if drawn is None else drawn.contact(draw))
+        there = there if drawn is None else there._replace(placement=drawn.placed(one, placed, draw))
+        table = _table(one, there, tell) if walled else None
         steady = predict(
             one,
             model=model,
@@ -147,14 +147,14 @@ def simulate(  # noqa: PLR0913 - the options of the command
             calibrated=calibrated,
             fit=fit if known is None else NO_FIT,  # a draw's values stand in its robot
             resolution=resolution,
-            placement=there if walled or drawn is not None else fixed,
+            placement=there.placement if walled or drawn is not None else fixed,
             band=False,
             progress=tell,
         )
         steady = steady if known is None else replace(steady, fitted_by=fit.name)
         if table is not None:
-            return run_in_tube(steady, table, timing, there, touching, rough, about, weight, tell)
-        return axial_run(steady, timing) if held else _free_run(steady, timing, placed, height, about, weight, tell)
+            return run_in_tube(steady, table, timing, there, about, tell)
+        return axial_run(steady, timing) if held else _free_run(steady, timing, release, about, tell)
 
     dataset = run(central, times, progress)
     if known is not None:
@@ -190,38 +190,30 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
     return [Note.named("along-tilted-axis", yaw=np.degrees(yaw), pitch=np.degrees(pitch), speed=speed)]
 
 
-def _table(
-    robot: Robot, placed: Placement, requested: InTube, roughness: float | None, progress: Progress | None
-) -> TubeTable:
+def _table(robot: Robot, release: Release, progress: Progress | None) -> TubeTable:
     """The robot's table, made if there is none, once all else is known to be right."""
-    batch = RobotBatch.of(robot, placed)
+    batch = RobotBatch.of(robot, release.placement)
     outside = broken(requirements(batch, TabledTube({})))
     if outside:
         raise InputError(f"{robot.name} with model 'tube': {outside[0].sentence()}")
-    check_in_tube(robot, placed, requested, roughness)
+    check_in_tube(robot, release)
     return table_for(batch, progress=progress)
 
 
 def _free_run(
-    steady: Prediction,
-    times: Timing,
-    placed: Placement,
-    roughness: float | None,
-    field: Field,
-    weight: bool,  # noqa: FBT001 - one of the run's settings
-    progress: Progress | None,
+    steady: Prediction, times: Timing, release: Release, field: Field, progress: Progress | None
 ) -> xr.Dataset:
-    """A run with six degrees of freedom."""
+    """A run with six degrees of freedom, without walls."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     _, time, switches, unused = times.timetable(2.0 * np.pi / turning_rate(steady), own)
-    links = in_tilted_field(links_without_walls(steady, roughness, weight=weight), field)
-    start = resting_state(steady.robot, links, placed)
+    links = in_tilted_field(links_without_walls(steady, release.roughness, weight=release.weight), field)
+    start = resting_state(steady.robot, links, release.placement)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])
     run = integrate(links, start, moments, switches, reach, progress).require_completion()
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
     notes = [*steady.warnings, *([Note.named("film-alone")] if steady.robot.channel is not None else [])]
-    notes += [*([NO_WEIGHT] if weight and not links.weight.any() else []), *unused]
+    notes += [*([NO_WEIGHT] if release.weight and not links.weight.any() else []), *unused]
     more = {"wall_gap": run.observed[:, core.SEEN_FILM] + links.roughness} if links.is_walled else {}
     attrs = free_attributes(steady, links, run, reach, title, notes)
     dataset = dataset_of(steady, links, run, switches, more, attrs)

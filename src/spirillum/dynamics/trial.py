@@ -23,7 +23,7 @@ from spirillum.data_tables import rows_of
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import is_held, state_of
 from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
-from spirillum.dynamics.tube_options import InTube, with_contact
+from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_BESIDE, NO_FIT, Fit
@@ -47,7 +47,7 @@ from spirillum.swimming.preparation import preparation_time, table_for, why_no_t
 from spirillum.swimming.released_motion import ASSUMPTION, HELD, SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
-from spirillum.units import KINDS, as_given, parse_option, show, speed_unit
+from spirillum.units import as_given, show, speed_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -299,20 +299,16 @@ _SAMPLES_PER_TURN = 12
 def quick_run(
     robot: Robot,
     table: TubeTable,
-    placed: Placement,
-    asked: InTube,
-    roughness: float | None,
+    release: Release,
     duration: float = TRIAL_DURATION,
     **settings: Any,
 ) -> xr.Dataset:
     """Return the run of one of many trials, with a waiting time, in larger steps than `simulate`."""
     from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
 
-    steady = predict(robot, model=WALLED, placement=placed, band=False, **settings)
+    steady = predict(robot, model=WALLED, placement=release.placement, band=False, **settings)
     times = Timing(duration=duration, samples_per_turn=_SAMPLES_PER_TURN)
-    return run_in_tube(
-        steady, table, times, placed, asked, roughness, Field(), weight=True, progress=None, tolerance=_TOLERANCE
-    )
+    return run_in_tube(steady, table, times, release, Field(), progress=None, tolerance=_TOLERANCE)
 
 
 @dataclass(frozen=True)
@@ -342,12 +338,13 @@ class TrialRequest:
             self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
-        height, channel = self._height, self.robot.channel
-        if height is not None and channel is not None:
+        release, channel = self._release, self.robot.channel
+        if release.roughness is not None and channel is not None:
             from spirillum.dynamics.start import check_roughness  # loads compiled loops
 
             diameter = self.robot.body.diameter
-            check_roughness(height, gap_of(Placement.of(self.placement), diameter, 0.5 * channel.diameter), diameter)
+            gap = gap_of(release.placement, diameter, 0.5 * channel.diameter)
+            check_roughness(release.roughness, gap, diameter)
 
     def _check_length(self, held: Prediction) -> None:
         """Refuse a requested duration of less than a millionth of a turn of the tail, or of more than a trial's."""
@@ -363,9 +360,9 @@ class TrialRequest:
             )
 
     @property
-    def _height(self) -> float | None:
-        """Requested height of the asperities, m."""
-        return None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
+    def _release(self) -> Release:
+        """Where and how the robot is released, without what is fitted of the contact."""
+        return Release.of(self.placement, self.in_tube, self.roughness)
 
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none."""
@@ -432,26 +429,24 @@ class TrialRequest:
         """The trial with its interval over what neither robot, request nor calibration states."""
         known = self.fit.posterior
         robot = self.fit.central(self.robot)
-        placed = self.fit.placed(robot, Placement.of(self.placement))
-        given = self._height
-        rough, touching = with_contact(self.fit.contact(), given, self.in_tube)
+        release = self._release.with_contact(self.fit.contact())
         derived = robot.derived().get("submerged_weight")
         weight = 0.0 if derived is None else derived.value
-        stated = {"wait": touching.wait, "roughness": rough, "friction_coefficient": touching.friction_coefficient}
-        table = table_for(RobotBatch.of(robot, placed))
+        stated = {name: getattr(release.in_tube, name) for name in ("wait", "friction_coefficient")}
+        stated["roughness"] = release.roughness
+        table = table_for(RobotBatch.of(robot, self.fit.placed(robot, release.placement)))
         unknowns = open_unknowns(robot, weight, stated)
 
         def run(sample: TrialSample) -> ReleasedMotion:
-            own, asked = with_contact(self.fit.contact(sample.draw), given, self.in_tube)
+            own = self._release.with_contact(self.fit.contact(sample.draw))
             values = {"wait": sample.wait, "friction_coefficient": sample.friction_coefficient}
             update = {name: value for name, value in values.items() if value is not None}
-            there = self.fit.placed(sample.robot, Placement.of(self.placement), sample.draw)
-            asked = asked.model_copy(update=update).of_trial(there)
-            height = own if sample.roughness is None else sample.roughness
-
+            there = self.fit.placed(sample.robot, own.placement, sample.draw)
+            asked = own.in_tube.model_copy(update=update).of_trial(there)
+            release = Release(there, asked, own.roughness if sample.roughness is None else sample.roughness)
             fit = self.fit if known is None else NO_FIT  # a draw's values stand in its robot
             settings = {"friction": self.friction, "calibrated": self.calibrated, "fit": fit}
-            quick = partial(quick_run, sample.robot, table, there, asked, height, self._length, **settings)
+            quick = partial(quick_run, sample.robot, table, release, self._length, **settings)
             return trial_of(held, quick, self._length)
 
         if known is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -19,6 +19,7 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.units import KINDS, parse_option
 
 TRIAL_WAIT = 60.0
 """Default time from release until the motor is switched on, s; assumed."""
@@ -65,11 +66,37 @@ class InTube(Options):
         return self if given else self.model_copy(update={"wait": 0.0 if moved else TRIAL_WAIT})
 
 
-def with_contact(contact: FittedContact, roughness: float | None, requested: InTube) -> tuple[float | None, InTube]:
-    """Roughness and settings of a run, with fitted values in place of those that are not given."""
-    if requested.friction_coefficient is None and contact.friction_coefficient is not None:
-        requested = requested.model_copy(update={"friction_coefficient": contact.friction_coefficient})
-    return contact.roughness if roughness is None else roughness, requested
+class Release(NamedTuple):
+    """Where and how a robot is released in its tube."""
+
+    placement: Placement
+    in_tube: InTube
+    roughness: float | None = None
+    """Height of the asperities, m; None: 1e-4 of the body's radius."""
+    weight: bool = True
+    """Whether weight and buoyancy act."""
+
+    @classmethod
+    def of(
+        cls,
+        placement: Placement | Mapping[str, Any] | None,
+        in_tube: InTube | Mapping[str, Any] | None,
+        roughness: str | float | None,
+        *,
+        weight: bool = True,
+    ) -> Release:
+        """From what a caller gives; a roughness with its unit, or a float in m."""
+        height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
+        return cls(Placement.of(placement), InTube.of(in_tube), height, weight)
+
+    def with_contact(self, contact: FittedContact) -> Release:
+        """The release with fitted values in place of those that are not given."""
+        requested = self.in_tube
+        if requested.friction_coefficient is None and contact.friction_coefficient is not None:
+            requested = requested.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+        return self._replace(
+            in_tube=requested, roughness=contact.roughness if self.roughness is None else self.roughness
+        )
 
 
 def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> None:

@@ -16,7 +16,7 @@ from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.run_summary import end_state
 from spirillum.dynamics.start import check_roughness, released_state, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
-from spirillum.dynamics.tube_options import InTube, read_flow
+from spirillum.dynamics.tube_options import InTube, Release, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.errors import InputError
@@ -142,24 +142,21 @@ def run_in_tube(
     steady: Prediction,
     table: TubeTable,
     times: Timing,
-    placed: Placement,
-    options: InTube,
-    roughness: float | None,
+    release: Release,
     field: Field,
-    weight: bool,  # noqa: FBT001 - one of the run's settings
     progress: Progress | None,
     tolerance: float = TubeRobot.tolerance,
 ) -> xr.Dataset:
     """A run with six degrees of freedom in the robot's tube."""
-    robot = steady.robot
+    robot, options = steady.robot, release.in_tube
     own = robot.drive.duty if robot.drive is not None else 1.0
-    links = links_in_tube(steady, table, placed, options, roughness, weight=weight)
+    links = links_in_tube(steady, table.packed, release)
     links = replace(in_tilted_field(links, field), tolerance=tolerance)
     turn = links.turn
     timetable = times.timetable(turn, own)
     begun: Samples | xr.Dataset
     if options.continued is None:
-        begun = released_state(robot, links, placed, options.azimuth)
+        begun = released_state(robot, links, release.placement, options.azimuth)
     else:
         begun = earlier_run(options.continued, steady, table, links, timetable.switches)
     dataset = tube_run(steady, links, begun, timetable, wait=options.wait or 0.0, progress=progress)
@@ -170,7 +167,7 @@ def run_in_tube(
     if options.flow is not None:
         limits.append(flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max())))
         notes += _flow_beyond(links.flow, float(dataset["time"][-1]), options.flow)
-    if weight and not links.weight.any():
+    if release.weight and not links.weight.any():
         notes.append(NO_WEIGHT)
     notes += check_stokes_flow(steady.batch, limits).values()
     stuck = sticking_notes(
@@ -192,13 +189,10 @@ def run_in_tube(
     )
 
 
-def links_in_tube(
-    steady: Prediction, table: TubeTable, placed: Placement, options: InTube, roughness: float | None, *, weight: bool
-) -> TubeRobot:
-    """Coefficients of a robot's rates in its tube."""
+def links_in_tube(steady: Prediction, table: Samples, release: Release) -> TubeRobot:
+    """Coefficients of a robot's rates in its tube, by its packed table."""
     turn = 2.0 * np.pi / turning_rate(steady)
-    around = _around(steady.robot, placed, options, roughness)
-    return tube_robot(steady, table.packed, around, turn=turn, weight=weight)
+    return tube_robot(steady, table, _around(steady.robot, release), turn=turn, weight=release.weight)
 
 
 def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
@@ -211,14 +205,15 @@ def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
     return []
 
 
-def check_in_tube(robot: Robot, placed: Placement, options: InTube, roughness: float | None) -> None:
+def check_in_tube(robot: Robot, release: Release) -> None:
     """Refuse requests that a run in a tube does not support, before minutes go into a table."""
+    placed, options, roughness, _ = release
     check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
             f"placement.tail_drop = {show(placed.tail_drop, 'mm')} has no effect in a free run; allowed: 0 mm"
         )
-    _around(robot, placed, options, roughness)
+    _around(robot, release)
     if options.continued is not None:
         _check_continued(placed, options)
         return
@@ -239,8 +234,8 @@ def _check_continued(placed: Placement, options: InTube) -> None:
             )
 
 
-def _around(robot: Robot, placed: Placement, options: InTube, roughness: float | None) -> Surroundings:
-    channel = robot.channel
+def _around(robot: Robot, release: Release) -> Surroundings:
+    channel, placed, options = robot.channel, release.placement, release.in_tube
     length = np.inf if channel is None or channel.length is None else channel.length
     radius = np.nan if channel is None else 0.5 * channel.diameter
     if options.flow is not None and (placed.flow is not None or placed.ends is not None):
@@ -262,7 +257,7 @@ def _around(robot: Robot, placed: Placement, options: InTube, roughness: float |
         ends=ends,
         length=length + END_LOSS * radius,
         flow=flow,
-        roughness=roughness,
+        roughness=release.roughness,
         coefficient=FRICTION_COEFFICIENT if options.friction_coefficient is None else options.friction_coefficient,
     )
 
