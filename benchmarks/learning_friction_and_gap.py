@@ -15,10 +15,11 @@ import numpy as np
 import spirillum as sp
 from spirillum.controllers.estimators import Bank
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.learning import DriveInterval, learnt
+from spirillum.controllers.learning import learnt
 from spirillum.controllers.loop import run_loop
 from spirillum.controllers.sensors import draw, plant_of
 from spirillum.controllers.stop_task import Timed
+from spirillum.dynamics.run_summary import DutyInterval
 
 LAB = {
     "remote": {"lost": 0.0},
@@ -50,7 +51,7 @@ def main() -> None:
         for end in ENDS:
             sights = [sight for _, sight in run.frames if sight is not None and sight.time <= end]
             readings = [reading for reading in run.readings if reading.time <= end]
-            answer = learnt(paths, lab, [DriveInterval(on, end)], sights, readings)
+            answer = learnt(paths, lab, [DutyInterval(on, end)], sights, readings)
             for name in ("friction", "gap"):
                 factor, true = getattr(answer, name), getattr(truth, name)
                 row = (factor.low <= true <= factor.high, factor.high / factor.low, factor.value / true)

@@ -10,9 +10,10 @@ import pytest
 
 from spirillum.controllers.estimators import Paths, interpolation, points
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.learning import DriveInterval, Learner, Learning, learnt
+from spirillum.controllers.learning import Learner, Learning, learnt
 from spirillum.controllers.loop import run_loop
 from spirillum.controllers.sensors import Detection, Message, MeterReading
+from spirillum.dynamics.run_summary import DutyInterval
 
 LAB = {"unknown": {"friction_factor": 3.0, "gap_factor": 2.0, "voltage_error": 0.01, "viscosity_error": 0.02}}
 END = 8.0
@@ -74,7 +75,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(trials: int) -> None:
     held, widths = [], []
     for seed in range(trials):
         truth, sights, readings = trial(lab, seed)
-        found = learnt(bank, lab, [DriveInterval(0.0, END)], sights, readings)
+        found = learnt(bank, lab, [DutyInterval(0.0, END)], sights, readings)
         assert found is not None
         factors = (found.friction, found.gap)
         held.append([one.low <= true <= one.high for one, true in zip(factors, truth, strict=True)])
@@ -87,7 +88,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(trials: int) -> None:
 def test_a_gap_that_changes_nothing_is_not_told() -> None:
     lab = Lab.of(LAB)
     _, sights, readings = trial(lab, 3, gap=0.0)
-    found = learnt(paths(gap=0.0), lab, [DriveInterval(0.0, END)], sights, readings)
+    found = learnt(paths(gap=0.0), lab, [DutyInterval(0.0, END)], sights, readings)
     assert found is not None
     assert found.friction.told
     assert not found.gap.told
@@ -96,13 +97,13 @@ def test_a_gap_that_changes_nothing_is_not_told() -> None:
 def test_nothing_is_said_before_there_is_enough_to_see() -> None:
     lab = Lab.of(LAB)
     _, sights, readings = trial(lab, 3)
-    assert learnt(paths(), lab, [DriveInterval(0.0, 1.0)], sights, readings) is None
+    assert learnt(paths(), lab, [DutyInterval(0.0, 1.0)], sights, readings) is None
 
 
 def test_without_a_meter_the_interval_is_wider() -> None:
     lab, bank = Lab.of(LAB), paths()
     _, sights, readings = trial(lab, 5)
-    wide, narrow = (learnt(bank, lab, [DriveInterval(0.0, END)], sights, told) for told in ([], readings))
+    wide, narrow = (learnt(bank, lab, [DutyInterval(0.0, END)], sights, told) for told in ([], readings))
     assert wide is not None
     assert narrow is not None
     assert wide.friction.high / wide.friction.low > narrow.friction.high / narrow.friction.low

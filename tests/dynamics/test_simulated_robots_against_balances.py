@@ -114,7 +114,7 @@ def test_films_against_reynolds_equation() -> None:
         "biorob2012-wide",
         body={"shape": "sphere", "diameter": "18 mm", "length": "18 mm", "front": "none", "rear": "none"},
     )
-    spot = films_of(robot, None, 1.0, 1.0).spots[0]
+    spot = films_of(robot, None, 1.0, 1.0)[1][0]
     along, across, viscosity = 0.009, 0.009 * 0.02 / 0.011, 3.5
     for film in (1e-4, 4e-4):
 

@@ -82,7 +82,7 @@ def record(run: LoopRun, plant: Plant) -> xr.Dataset:
 
     moments = run.moments
     data: dict[str, Any] = {
-        "position": (("time", "axis"), np.array([m.pose.position for m in moments]), attributes("position")),
+        "position": (("time", "axis"), run.position, attributes("position")),
         "attitude": (("time", "quaternion"), np.array([m.pose.attitude for m in moments]), attributes("attitude")),
         "imposed_flow": ("time", np.array(run.flows), attributes("imposed_flow")),
     }
@@ -102,7 +102,7 @@ def record(run: LoopRun, plant: Plant) -> xr.Dataset:
         meaning = f"{QUANTITIES[base].meaning}, {end} end of its 95 % interval" if end else None
         data[name] = ("decision_time", values, attributes(base, meaning=meaning))
     coords = {
-        "time": ("time", np.array([m.time for m in moments]), attributes("time")),
+        "time": ("time", run.time, attributes("time")),
         "frame_time": ("frame_time", np.array([time for time, _ in run.frames]), attributes("frame_time")),
         "reading_time": ("reading_time", np.array([r.time for r in run.readings]), attributes("reading_time")),
         "decision_time": ("decision_time", np.array([d.time for d in run.decisions]), attributes("decision_time")),

@@ -213,7 +213,7 @@ class HoldSpeedTask(_CourseTask):
     leash: ClassVar[float] = LEASH
 
     def _error(self, run: LoopRun, brief: Brief) -> float:
-        time, place = _path(run)
+        time, place = run.time, run.position[:, 0]
         starts = np.arange(0.5 * brief.duration, brief.duration - _SPEED_OVER, 0.25)
         ways = np.interp(starts + _SPEED_OVER, time, place) - np.interp(starts, time, place)
         return float(np.median(brief.way * ways / _SPEED_OVER)) - self.set_speed
@@ -237,7 +237,7 @@ class RideOutTask(_CourseTask):
         return super().target(time, way)[0], self.tolerance
 
     def _error(self, run: LoopRun, brief: Brief) -> float:
-        time, place = _path(run)
+        time, place = run.time, run.position[:, 0]
         travelled = float(np.interp(brief.duration, time, place) - place[0])
         return brief.way * travelled - self.set_speed * brief.duration
 
@@ -265,14 +265,6 @@ class SaveBatteryTask(RideOutTask):
 
     def _is_good(self, error: float) -> bool:
         return error >= -self.tolerance
-
-
-def _path(run: LoopRun) -> tuple[Samples, Samples]:
-    """Times, s, and positions along the tube, m."""
-    return (
-        np.array([moment.time for moment in run.moments]),
-        np.array([moment.pose.position[0] for moment in run.moments]),
-    )
 
 
 def _mean_speed(plant: Plant, duty: float, duration: float, progress: Progress | None) -> float:

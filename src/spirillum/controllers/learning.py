@@ -27,6 +27,7 @@ from spirillum.arrays import Samples
 from spirillum.controllers.estimators import Bank, Paths, interpolation, points
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import Command, Controller, Detection, Message, MeterReading
+from spirillum.dynamics.run_summary import DutyInterval
 from spirillum.envelope import quantity
 
 BLOCK = 1.0  #: Length of a block, s.
@@ -41,14 +42,6 @@ _ANYWHERE = 1e2  # standard deviation of where an angle began, rad
 _COARSE, _FINE = 41, 61
 _NEGLIGIBLE = 15.0  # points whose log posterior is below the maximum by more than this are left out of the finer grid
 _UNINFORMED = 0.8  # a factor counts as not learnt where its 95 % interval is at least this share of the prior's
-
-
-@dataclass(frozen=True)
-class DriveInterval:
-    """A time in which the drive was on; s."""
-
-    start: float
-    end: float
 
 
 @dataclass(frozen=True)
@@ -92,7 +85,7 @@ class _Block:
 def learnt(
     paths: Paths,
     lab: Lab,
-    stretches: Sequence[DriveInterval],
+    stretches: Sequence[DutyInterval],
     sights: Sequence[Detection],
     readings: Sequence[MeterReading],
 ) -> RobotEstimate | None:
@@ -132,7 +125,7 @@ class _Electric:
     noise: Samples  # variances of the means, (rows, 2)
 
 
-def _blocks(paths: Paths, number: int, stretch: DriveInterval, sights: Sequence[Detection]) -> list[_Block]:
+def _blocks(paths: Paths, number: int, stretch: DutyInterval, sights: Sequence[Detection]) -> list[_Block]:
     """Blocks of one stretch, without those that have too few frames."""
     blocks: list[_Block] = []
     begin, end = stretch.start + SETTLING, min(stretch.end, float(paths.time[-1]))
@@ -163,7 +156,7 @@ def _means_at(time: Samples, moments: Samples) -> Samples:
 
 
 def _electric(
-    paths: Paths, lab: Lab, stretches: Sequence[DriveInterval], readings: Sequence[MeterReading]
+    paths: Paths, lab: Lab, stretches: Sequence[DutyInterval], readings: Sequence[MeterReading]
 ) -> tuple[Samples, _Electric]:
     end = float(paths.time[-1])
     inside = [one for one in readings if any(s.start + SETTLING <= one.time <= min(s.end, end) for s in stretches)]
@@ -325,14 +318,14 @@ class Learner:
         self._next = until + BLOCK
         self.learnt = learnt(self._bank.paths(), self._lab, self._on(until), self._sights, self._readings)
 
-    def _on(self, until: float) -> list[DriveInterval]:
+    def _on(self, until: float) -> list[DutyInterval]:
         """Stretches of time in which the drive was on."""
-        stretches: list[DriveInterval] = []
+        stretches: list[DutyInterval] = []
         for (start, duty), (end, _) in zip(self._duties, [*self._duties[1:], (until, 0.0)], strict=True):
             if duty > 0.0 and stretches and stretches[-1].end == start:
-                stretches[-1] = DriveInterval(stretches[-1].start, end)
+                stretches[-1] = DutyInterval(stretches[-1].start, end)
             elif duty > 0.0:
-                stretches.append(DriveInterval(start, end))
+                stretches.append(DutyInterval(start, end))
         return stretches
 
 

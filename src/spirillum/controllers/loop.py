@@ -14,6 +14,9 @@ from enum import IntEnum
 from itertools import count, pairwise
 from typing import Any
 
+import numpy as np
+
+from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import Command, Controller, Detection, FlowPulse, Message, MeterReading, Senses
 from spirillum.dynamics.integration import INTERRUPTED, Progress
@@ -67,6 +70,16 @@ class LoopRun:
     def interrupted(self) -> bool:
         """Whether it was interrupted."""
         return self.ended == INTERRUPTED
+
+    @property
+    def time(self) -> Samples:
+        """When each of `moments` is, s."""
+        return np.array([moment.time for moment in self.moments])
+
+    @property
+    def position(self) -> Samples:
+        """Positions of the body then, m, (n, 3)."""
+        return np.array([moment.pose.position for moment in self.moments])
 
     @property
     def time_on(self) -> float:

@@ -232,10 +232,8 @@ class KeepAxisTask(Task):
         return np.zeros_like(time), self.tolerance
 
     def _error(self, run: LoopRun, brief: Brief) -> float:
-        time = np.array([moment.time for moment in run.moments])
-        distance = np.array([np.hypot(*moment.pose.position[1:]) for moment in run.moments])
         even = np.linspace(0.5 * brief.duration, brief.duration, 400)
-        return float(np.mean(np.interp(even, time, distance)))
+        return float(np.mean(np.interp(even, run.time, np.hypot(run.position[:, 1], run.position[:, 2]))))
 
     def _is_good(self, error: float) -> bool:
         return error <= self.tolerance

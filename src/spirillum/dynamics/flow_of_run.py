@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
@@ -160,13 +158,16 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     mean_flow = float(now["mean_flow"])
     drawn = max(gap, _THINNEST * robot.body.diameter)
     requested = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
-    with _run_notes():
+    try:
         friction = friction_reading(str(now.attrs.get("friction", robot.friction.reading)))
         batch = RobotBatch.of(robot, Placement.of(requested))
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
         batch = RobotBatch.of(robot, Placement.of({**requested, "gap": drawn}))
         check_domain(robot, Tube(), batch)
+    except InputError as error:  # in terms of the run, not of a placement
+        own = re.sub(r"placement\.(\w+)", lambda found: _OWN_NAMES.get(found[1], found[0]), str(error))
+        raise InputError(f"the run: {own}") from error
     notes = list(notes_in(now.attrs))
     if gap < drawn:
         notes.append(Note.named("lifted-off-film", film=show(gap, "um"), lift=show(drawn - gap, "um")))
@@ -193,13 +194,3 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         fitted_by=now.attrs["fitted_by"],
     )
     return RunSnapshot(found, phase, body, rotor, mean_flow, max(drawn - gap, 0.0))
-
-
-@contextmanager
-def _run_notes() -> Iterator[None]:
-    """Restate errors of a placement in terms of the run."""
-    try:
-        yield
-    except InputError as error:
-        own = re.sub(r"placement\.(\w+)", lambda found: _OWN_NAMES.get(found[1], found[0]), str(error))
-        raise InputError(f"the run: {own}") from error

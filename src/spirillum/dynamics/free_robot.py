@@ -50,32 +50,23 @@ _STIFFEST = 1e10
 """Largest resistance of a film over that of the robot, so that numbers stay numbers."""
 
 
-@dataclass(frozen=True)
-class WallFilms:
-    """Rings of a robot that may near the wall, as `kernels.two_links` reads them."""
+def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> tuple[Samples, Samples]:
+    """The channel's wall and the rings of a robot that may near it, as `kernels.two_links` reads them.
 
-    wall: Samples
-    """Radius of the channel (infinite: none), roughness, largest resistance of a film, load: `kernel.WALL` columns."""
-    spots: Samples
-    """Rings (n, 6), `kernel.RING` columns: x, radius, half-length along the axis, resistance, power, reach.
-
-    A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not at all
-    beyond its reach, where the resistance in open fluid is all there is.
+    The wall (4,): radius of the channel (infinite: none), roughness, largest resistance of a film, and the load that
+    halves a film as thick as the roughness. Rings (n, 6): x, radius, half-length along the axis, resistance, power,
+    reach. A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not
+    at all beyond its reach, where the resistance in open fluid is all there is.
     """
-
-
-def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> WallFilms:
-    """The lubrication films between a robot and its channel; a film as thick as the roughness is halved by `load`."""
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
-        return WallFilms(np.array([np.inf, height, np.inf, load]), np.zeros((0, core.RING_SIZE)))
+        return np.array([np.inf, height, np.inf, load]), np.zeros((0, core.RING_SIZE))
     robot.check_body("motion beside the wall of a channel, with lubrication films,", ", or channel = 'none'")
     channel = 0.5 * robot.channel.diameter
-    rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
-    spots = np.array(rows)
+    spots = np.array([*_body_rings(robot, channel), *_tail_rings(robot, channel)])
     spots[:, core.RING_RESISTANCE] /= spots[:, core.RING_REACH] ** spots[:, core.RING_POWER]
-    return WallFilms(np.array([channel, height, _STIFFEST * drag, load]), spots)
+    return np.array([channel, height, _STIFFEST * drag, load]), spots
 
 
 def _across(radius: float, channel: float) -> float:
@@ -305,9 +296,9 @@ class TwoLinks(FreeRobot):
     drag: Samples
     """Resistance of both links against the seven rates at phase 0 of the tail (7, 7)."""
     wall: Samples
-    """The channel's wall (4,), see `spirillum.dynamics.free_robot`."""
+    """The channel's wall (4,), see `films_of`."""
     spots: Samples
-    """Rings that may near the wall (n, 6), see `spirillum.dynamics.free_robot`."""
+    """Rings that may near the wall (n, 6), see `films_of`."""
 
     @property
     def data(self) -> Samples:
@@ -350,13 +341,13 @@ def two_links(
     drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
     heavy, drive = weight_of(robot) if weight else np.zeros(core.WEIGHT_SIZE), drive_of(batch)
     length, torque = float(np.sqrt(drag[4, 4] / drag[1, 1])), torque_scale(drag, heavy, drive)
-    films = films_of(robot, roughness, float(drag[1, 1]), torque / length)
+    wall, spots = films_of(robot, roughness, float(drag[1, 1]), torque / length)
     return TwoLinks(
         drag=drag,
         friction=friction_of(batch, friction, effective),
         weight=heavy,
-        wall=films.wall,
-        spots=films.spots,
+        wall=wall,
+        spots=spots,
         drive=drive,
         length=length,
         torque=torque,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_type_hints
@@ -103,11 +103,11 @@ class Electrics:
 class CalibrationFactors:
     """Table III's factors for one model, and the geometry that they were fitted to."""
 
-    body_drag: PerRobot
-    body_rotation: PerRobot
-    channel_diameter: PerRobot
-    body_diameter: PerRobot
-    body_length: PerRobot
+    body_drag: Annotated[PerRobot, Column("body_drag")]
+    body_rotation: Annotated[PerRobot, Column("body_rotation")]
+    channel_diameter: Annotated[PerRobot, Column("fitted_to.channel_diameter")]
+    body_diameter: Annotated[PerRobot, Column("fitted_to.body_diameter")]
+    body_length: Annotated[PerRobot, Column("fitted_to.body_length")]
 
 
 @dataclass(frozen=True)
@@ -175,11 +175,14 @@ class RobotBatch:
         first = items[0]
         hand = np.array([robot.hand for robot in items])
         return cls(
-            **{name: _column(items, source) for name, source in _columns("RobotBatch").items()},
+            **_stacked("RobotBatch", items),
             hand=hand,
             electrics=_electrics(items, hand),
             curve=first.drive.curve if first.drive else None,
-            calibration={name: _factors(items, name) for name in first.calibration},
+            calibration={
+                model: CalibrationFactors(**_stacked("CalibrationFactors", [item.calibration[model] for item in items]))
+                for model in first.calibration
+            },
             shape=first.body.shape,
             front=first.body.front_end,
             rear=first.body.rear_end,
@@ -344,34 +347,22 @@ def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float)
     return values
 
 
-def _value(robot: RobotTables, source: Column) -> float:
-    item: object = robot
+def _value(table: object, source: Column) -> float:
     for name in source.path.split("."):
-        item = getattr(item, name, None)
-    return float(item) if isinstance(item, (int, float)) else source.unset
+        table = getattr(table, name, None)
+    return float(table) if isinstance(table, (int, float)) else source.unset
 
 
-def _column(robots: Iterable[RobotTables], source: Column) -> PerRobot:
-    return np.array([_value(robot, source) for robot in robots])
+def _stacked(struct: str, tables: Sequence[object]) -> dict[str, Any]:
+    """Columns of a struct of arrays, from tables that have their fields."""
+    return {name: np.array([_value(one, source) for one in tables]) for name, source in _columns(struct).items()}
 
 
 def _electrics(robots: Sequence[RobotTables], hand: PerRobot) -> Electrics | None:
     if robots[0].motor is None or robots[0].battery is None:
         return None
     forward = np.array([1.0 if robot.motor and robot.motor.polarity == "forward" else -1.0 for robot in robots])
-    columns = {name: _column(robots, source) for name, source in _columns("Electrics").items()}
-    return Electrics(**columns, polarity=forward * hand)
-
-
-def _factors(robots: Sequence[RobotTables], model: str) -> CalibrationFactors:
-    entries = [robot.calibration[model] for robot in robots]
-    return CalibrationFactors(
-        body_drag=np.array([entry.body_drag for entry in entries]),
-        body_rotation=np.array([entry.body_rotation for entry in entries]),
-        channel_diameter=np.array([entry.fitted_to.channel_diameter for entry in entries]),
-        body_diameter=np.array([entry.fitted_to.body_diameter for entry in entries]),
-        body_length=np.array([entry.fitted_to.body_length for entry in entries]),
-    )
+    return Electrics(**_stacked("Electrics", robots), polarity=forward * hand)
 
 
 def _shared(robot: RobotTables) -> tuple[object, ...]:
