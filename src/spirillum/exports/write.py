@@ -297,8 +297,8 @@ def export(
         if angle or fineness != 1.0 or unit is not None or sidecar is not None:
             raise InputError("phase, fineness, unit or sidecar with .fmu; allowed: only for the robot's shape")
         check_choice("motion", motion or "held", ("held", "free"))
-        make = _released_unit if motion == "free" else _axial_unit
-        return make(target, robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
+        options = {"friction": friction, "calibration": calibration, "placement": placement}
+        return _unit_of(target, robot, free=motion == "free", model=model or AUTO, **options)
     if any(given is not None for given in of_held):
         raise InputError(
             f"motion, friction, calibration or a placement (gap, pitch, flow) with {target.suffix.lower()}; allowed: "
@@ -348,32 +348,26 @@ def _shape_of(
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))
 
 
-def _axial_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
-    from spirillum.interfaces.fmu import axial_model
+def _unit_of(target: Path, robot: str | Path | Mapping[str, Any] | Robot, *, free: bool, **options: Any) -> Export:
+    """An FMU, written: of the robot held to its channel's axis, or released in its channel."""
+    from spirillum.interfaces.fmu import axial_model, fmu_bytes, free_model
 
-    axial = axial_robot(robot, **options)
-    inertia = axial.check_steady(1.0, axial.flow or 0.0)  # the duty is an input of the unit
-    return _unit_of(axial_model(axial), target, inertia)
-
-
-def _released_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
-    from spirillum.interfaces.fmu import free_model
-
-    if options["model"] not in (AUTO, "tube"):
+    notes: Iterable[Note]
+    if not free:
+        axial = axial_robot(robot, **options)
+        notes = axial.check_steady(1.0, axial.flow or 0.0)  # the duty is an input of the unit
+        model = axial_model(axial)
+    elif options["model"] in (AUTO, "tube"):
+        plant = Plant(robot, **options)
+        model, notes = free_model(plant), plant.warnings
+    else:
         raise InputError(
             f"model = {str(options['model'])[:40]!r} with motion = 'free' and .fmu; allowed: 'tube', or 'auto'"
         )
-    plant = Plant(robot, **options)
-    return _unit_of(free_model(plant), target, plant.warnings)
-
-
-def _unit_of(model: FmuModel, target: Path, notes: Iterable[Note]) -> Export:
-    from spirillum.interfaces.fmu import fmu_bytes
-
     _commit(target, {target.name: fmu_bytes(model)})
-    robot, warnings = model.prediction.robot, tuple(dict.fromkeys((*model.prediction.warnings, *notes)))
+    own, warnings = model.prediction.robot, tuple(dict.fromkeys((*model.prediction.warnings, *notes)))
     files = (Written(target, f"{KINDS_OF_FILES['.fmu']} with its C source"),)
-    return Export(robot, 0.0, files, (), links_of(robot), None, warnings, model)
+    return Export(own, 0.0, files, (), links_of(own), None, warnings, model)
 
 
 def _commit(target: Path, contents: Mapping[str, bytes]) -> None:

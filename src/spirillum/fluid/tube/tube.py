@@ -73,6 +73,10 @@ class _SolidKey(NamedTuple):
     pose: TubePose
     fineness: Fineness
 
+    def made(self) -> Solids:
+        """The solids, not solved for yet."""
+        return Solids(self.solids, self.pose, self.fineness, np.array(self.near).reshape(-1, 3))
+
 
 def _solid_key(g: RobotGeometry, part: str, pose: TubePose, fineness: Fineness) -> _SolidKey:
     near = tuple(map(tuple, _near(g).tolist())) if "tail" in PIECES[part] else ()
@@ -82,13 +86,13 @@ def _solid_key(g: RobotGeometry, part: str, pose: TubePose, fineness: Fineness) 
 @lru_cache(maxsize=1)
 def _solids(key: _SolidKey) -> Solids:
     """Solids of a pose; the last one is cached, for consecutive tails share a pose and factorizations are large."""
-    return Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3))
+    return key.made()
 
 
 @lru_cache(maxsize=4096)
 def _size(key: _SolidKey) -> tuple[int, int]:
     """Number of unknowns of one parity, and of waves between solids and wall; of these 0 with too many unknowns."""
-    solids = Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3))
+    solids = key.made()
     few = not solids.none and solids.size <= _MOST_UNKNOWNS
     return solids.size, sum(solids.waves(solids.gap).orders) if few else 0
 
@@ -96,7 +100,7 @@ def _size(key: _SolidKey) -> tuple[int, int]:
 @lru_cache(maxsize=4096)
 def _memory(key: _SolidKey) -> float:
     """See `Solids.memory`."""
-    return Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3)).memory
+    return key.made().memory
 
 
 def _turned(wire: Wire, phase: float) -> Wire:
