@@ -69,7 +69,20 @@ def solve(
 ) -> UnitTwistSolution:
     """Resistance of two rigid parts in unbounded fluid of viscosity 1, twists about the origin."""
     with one_thread():
-        return _solve(solids, wires, resolution)
+        lines = tuple(wire for wire, _ in wires)
+        points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
+        system = wire_system(wires, resolution.wire)
+        if not solids:
+            strengths = solve_wires(system.mobility, system.motion)
+            matrix = system.motion.T @ strengths + system.own
+            return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), strengths, system)
+        blobs = np.concatenate([np.full(len(wire.points), wire.blob) for wire in lines]) if lines else np.zeros(0)
+        near = np.stack([points[:, 0], np.hypot(points[:, 1], points[:, 2]), blobs], axis=1)
+        panels = panels_of([outline for outline, _ in solids], longest_panels(solids, near), resolution.order)
+        images = _Images.of(panels, np.array([part for _, part in solids]), lines, system, resolution)
+        strengths = solve_wires(system.mobility - images.mobility, system.motion - images.drift)
+        matrix = images.resistance + (system.motion - images.drag).T @ strengths + system.own
+        return _solution(matrix, panels, lines, images.densities(strengths), strengths, system)
 
 
 def one_thread() -> AbstractContextManager[object]:
@@ -84,25 +97,6 @@ def _thread_pools() -> ThreadpoolController:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
-
-
-def _solve(
-    solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Discretisation
-) -> UnitTwistSolution:
-    lines = tuple(wire for wire, _ in wires)
-    points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
-    system = wire_system(wires, resolution.wire)
-    if not solids:
-        strengths = solve_wires(system.mobility, system.motion)
-        matrix = system.motion.T @ strengths + system.own
-        return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), strengths, system)
-    blobs = np.concatenate([np.full(len(wire.points), wire.blob) for wire in lines]) if lines else np.zeros(0)
-    near = np.stack([points[:, 0], np.hypot(points[:, 1], points[:, 2]), blobs], axis=1)
-    panels = panels_of([outline for outline, _ in solids], longest_panels(solids, near), resolution.order)
-    images = _Images.of(panels, np.array([part for _, part in solids]), lines, system, resolution)
-    strengths = solve_wires(system.mobility - images.mobility, system.motion - images.drift)
-    matrix = images.resistance + (system.motion - images.drag).T @ strengths + system.own
-    return _solution(matrix, panels, lines, images.densities(strengths), strengths, system)
 
 
 def solve_wires(mobility: Samples, motion: Samples) -> Samples:

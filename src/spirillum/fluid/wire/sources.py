@@ -26,12 +26,12 @@ _GRADING = 4  # panels at a sharp edge: distance from it as the fourth power of 
 
 @lru_cache(maxsize=8)
 def _rule(order: int) -> tuple[Samples, Samples, Samples, Samples, Samples]:
-    """Nodes, barycentric weights and Gauss weights of a panel; abscissas and weights of the finer rule."""
+    """Nodes and barycentric weights on [-1, 1], abscissas and weights of a finer rule, weights of the nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
     difference = nodes[:, None] - nodes[None, :] + np.eye(order)
     barycentric = 1.0 / np.prod(2.0 * difference, axis=1)
     fine, fine_weights = np.polynomial.legendre.leggauss(max(_FINE, order))
-    return nodes, barycentric, weights, fine, fine_weights
+    return nodes, barycentric, fine, fine_weights, weights
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,8 @@ class Panels:
 
     @property
     def rule(self) -> tuple[Samples, Samples, Samples, Samples, Samples]:
-        """Nodes and barycentric weights on [-1, 1], abscissas and weights of a finer rule, weights of the nodes."""
-        nodes, barycentric, weights, fine, fine_weights = _rule(self.order)
-        return nodes, barycentric, fine, fine_weights, weights
+        """Of its panels: see `_rule`."""
+        return _rule(self.order)
 
     @property
     def order(self) -> int:
@@ -67,8 +66,7 @@ class Panels:
     @cached_property
     def area(self) -> Samples:
         """Element rho du at each node: surface element over ds dtheta/du, (nodes,)."""
-        weights = _rule(self.order)[2]
-        area: Samples = (weights * self.rho).ravel()
+        area: Samples = (self.rule[4] * self.rho).ravel()
         return area
 
     @cached_property
@@ -84,7 +82,7 @@ class Panels:
     @cached_property
     def normal(self) -> Samples:
         """Normal times ds/du, outward for outlines that run from front to rear, (nodes, 2) in (x, rho)."""
-        nodes, barycentric = _rule(self.order)[:2]
+        nodes, barycentric = self.rule[:2]
         difference = nodes[:, None] - nodes[None, :] + np.eye(self.order)
         derivative = barycentric[None, :] / barycentric[:, None] / difference
         np.fill_diagonal(derivative, 0.0)
@@ -93,7 +91,7 @@ class Panels:
 
     def cardinals(self, places: Samples) -> Samples:
         """Lagrange polynomials of a panel's nodes at points in [-1, 1] that are no nodes, (points, p)."""
-        nodes, barycentric = _rule(self.order)[:2]
+        nodes, barycentric = self.rule[:2]
         terms: Samples = barycentric / (places[:, None] - nodes)
         values: Samples = terms / terms.sum(axis=1, keepdims=True)
         return values
