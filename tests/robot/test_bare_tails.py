@@ -9,7 +9,7 @@ from tests.support.commands import run_command
 
 from spirillum import compare_models, load, page, predict, prepare, resistance, simulate
 from spirillum.designs.criteria import Variable
-from spirillum.designs.learned import corrected, solved_at
+from spirillum.designs.learned import Corrected, solved_at
 from spirillum.errors import InputError
 from spirillum.fluid.wire.slender import Slender
 from spirillum.robot.batch import RobotBatch
@@ -58,7 +58,7 @@ def test_models_stand_side_by_side_without_effects_of_a_body() -> None:
 
 def test_a_design_is_learned_as_that_of_a_robot() -> None:
     batch = RobotBatch.of(load(BARE)).with_values({"tail.wavelength": np.array([11e-3, 12e-3, 13e-3, 14e-3])})
-    model = corrected("slender", solved_at("slender", batch, (Variable("tail.wavelength", "m", 10e-3, 14e-3),)))
+    model = Corrected("slender", solved_at("slender", batch, (Variable("tail.wavelength", "m", 10e-3, 14e-3),)))
     assert np.allclose(joined(model.axial(batch)), joined(Slender().axial(batch)), rtol=1e-9, atol=1e-15)
 
 
