@@ -415,10 +415,10 @@ def whole_files(folder: Path) -> dict[str, bytes]:
 
     kept = run.keep
 
-    def copied(task: Any, part: Any, parts: Path | None) -> None:
-        kept(task, part, parts)
-        if parts is not None and not (folder / "part.npz").exists():
-            shutil.copy(parts / task.file_name, folder / "part.npz")
+    def copied(number: int, part: Any, parts: Path) -> None:
+        kept(number, part, parts)
+        if not (folder / "part.npz").exists():
+            shutil.copy(next(parts.glob("part-*.npz")), folder / "part.npz")
 
     report, run.keep, written.write_report = written.write_report, copied, lambda *_, **__: None
     try:

@@ -51,7 +51,7 @@ def settling_figure(settling: Settling) -> Figure:
         for axes, colours, label in zip(panels, lines, labels, strict=True):
             shown = lengths if "gap" in colours else np.rad2deg
             for name, colour in colours.items():
-                axes.plot(time, shown(settling.way(name)), color=COLOURS[colour])
+                axes.plot(time, shown(settling.way(name)), color=COLOURS[colour], label=name)
                 if settling.lying.state == "steady":
                     axes.axhline(float(shown(np.array(getattr(settling.lying, name)))), **_STEADY)
             axes.set_xlim(0.0, time[-1])
