@@ -413,7 +413,7 @@ def whole_files(folder: Path) -> dict[str, bytes]:
     from spirillum.results import study as written
     from spirillum.studies import run
 
-    kept = run.keep
+    kept, period = run.keep, run._PERIOD
 
     def copied(number: int, part: Any, parts: Path) -> None:
         kept(number, part, parts)
@@ -421,11 +421,12 @@ def whole_files(folder: Path) -> dict[str, bytes]:
             shutil.copy(next(parts.glob("part-*.npz")), folder / "part.npz")
 
     report, run.keep, written.write_report = written.write_report, copied, lambda *_, **__: None
+    run._PERIOD = -1.0  # each part is kept at once
     try:
         sp.study(folder / "s.toml", output=folder / "out")
         sp.study(folder / "s.toml", store=folder / "out.zarr")
     finally:
-        run.keep, written.write_report = kept, report
+        run.keep, run._PERIOD, written.write_report = kept, period, report
     import pyarrow as pa
     from pyarrow import parquet
 
