@@ -122,13 +122,9 @@ class PosteriorAttributes(_Table):
 
     @classmethod
     def of(cls, attributes: dict[str, Any]) -> PosteriorAttributes:
-        """Attributes as they were read."""
-        return cls.model_validate({name: _plain(value) for name, value in attributes.items()})
-
-
-def _plain(value: Any) -> Any:
-    """A number of numpy as one of Python."""
-    return value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
+        """Attributes as they were read, with numbers of numpy as those of Python."""
+        single = (name for name, value in attributes.items() if hasattr(value, "item") and value.size == 1)
+        return cls.model_validate({**attributes, **{name: attributes[name].item() for name in single}})
 
 
 @dataclass(frozen=True)

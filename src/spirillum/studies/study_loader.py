@@ -125,7 +125,9 @@ def load_study(
     if study.size > largest:
         store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
         raise InputError(f"{name}: the study requests {study.size} results; allowed: at most {largest}{store}")
-    entries = list(_entries_of(study))
+    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
+    each = [dict(zip(study.vary, values, strict=True)) for values in product(*study.vary.values())]
+    entries = list(product(sources, each))
     robots = tuple(_robot(entry, folder, overrides or {}, varied, name) for entry, varied in entries)
     if study.grid is None:
         _check_different(robots, entries, name)
@@ -173,14 +175,6 @@ def _read(source: str | Path | Mapping[str, Any], instead: Mapping[str, Any]) ->
     if isinstance(study, list):
         raise refused_table(study, name)
     return study, name, folder
-
-
-def _entries_of(study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Source and varied fields of every robot that is to be loaded."""
-    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
-    for source in sources:
-        for values in product(*study.vary.values()):
-            yield source, dict(zip(study.vary, values, strict=True))
 
 
 def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[str, Any]]], name: str) -> None:

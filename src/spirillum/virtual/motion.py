@@ -16,7 +16,7 @@ from spirillum.notes import Note
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
+from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.virtual.optics import tube_height
 from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
@@ -73,15 +73,10 @@ def steady_rates(
     found = {name: float(getattr(steady, name)) for name in given} | fixed
     prescribed = [name for name in fixed if name != "tail_rotation_rate"]
     source = f"{choice.model}, prescribed: {', '.join(prescribed)}" if prescribed else choice.model
-    walls = () if "forward_velocity" in fixed else _without_walls(robot, choice)
-    return found, source, (*steady.warnings, *walls), choice.reason
-
-
-def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[Note, ...]:
-    """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none."""
-    if robot.channel is None or find_swimmer_model(choice.model).placed:
-        return ()
-    return (Note.named("film-without-walls", model=choice.model, walled=WALLED),)
+    notes = steady.warnings
+    if "forward_velocity" not in fixed and robot.channel is not None and not find_swimmer_model(choice.model).placed:
+        notes += (Note.named("film-without-walls", model=choice.model, walled=WALLED),)
+    return found, source, notes, choice.reason
 
 
 def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:
@@ -149,15 +144,9 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     if trial.duration is not None:
         trajectory = trajectory.until(trial.duration)
     source = f"run, {model}" if model else "run"
-    return TrialMotion(trajectory, source, _between_samples(trajectory), motion="run")
-
-
-def _between_samples(trajectory: TrialTrajectory) -> tuple[Note, ...]:
-    """A sentence where the samples of a run are too few for what the tail does between them."""
     step = float(np.abs(np.diff(trajectory.tail_phase)).max())
-    if step <= _LARGEST_STEP:
-        return ()
-    return (Note.named("interpolated-poses", angle=np.degrees(step)),)
+    notes = (Note.named("interpolated-poses", angle=np.degrees(step)),) if step > _LARGEST_STEP else ()
+    return TrialMotion(trajectory, source, notes, motion="run")
 
 
 def _clearance(robot: Robot) -> float:

@@ -27,7 +27,8 @@ _SOFTWARE_LIBRARIES = ("libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6")
 
 def new_plotter(size: tuple[int, int], *, live: bool = False) -> Any:
     """An empty PyVista plotter with an OpenGL context, in a window if `live`, else in memory."""
-    if live and not _has_display():
+    display = not sys.platform.startswith("linux") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if live and not display:
         raise InputError(f"--window: DISPLAY is not set; {_INSTEAD}")
     with _quiet_context(live=live):
         pyvista = import_optional("pyvista", "a 3D picture")
@@ -56,12 +57,6 @@ def new_plotter(size: tuple[int, int], *, live: bool = False) -> Any:
             vtkLogger.SetStderrVerbosity(verbosity)
             vtkObject.SetGlobalWarningDisplay(talkative)
     return plotter
-
-
-def _has_display() -> bool:
-    if not sys.platform.startswith("linux"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 @contextmanager

@@ -126,8 +126,11 @@ def show(
         scene.place(pose)
         scene.look(camera)
         image = np.array(Image.fromarray(scene.image()).reduce(finer))
+    lines = ["computed geometry" + (", to scale" if camera.parallel else "")]
+    if glass is not None and loaded.channel is not None:
+        lines.append(f"a piece of its channel of {in_words(loaded.channel.diameter, 'm')} inner diameter")
     bar = scale_bar(camera, pixels, pose.position)
-    image = blended_into(words_on(pixels, camera, bar, loaded.name, _lines(loaded, camera, glass)))(image)
+    image = blended_into(words_on(pixels, camera, bar, loaded.name, lines))(image)
     if target is not None:
         _write_png(image, target, loaded, view)
     return Picture3D(loaded, view, turned, image, camera, pose, target)
@@ -161,13 +164,6 @@ def shown_points(solids: DrawnRobot, pose: RobotPose, glass: tuple[float, float]
     radius = 0.5 * channel.diameter * (1.0 + WALL)
     ring = np.stack([np.zeros(48), radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
     return np.concatenate([corners, *(ring + np.array([end, 0.0, 0.0]) for end in glass)])
-
-
-def _lines(robot: Robot, camera: SceneCamera, glass: tuple[float, float] | None) -> list[str]:
-    lines = ["computed geometry" + (", to scale" if camera.parallel else "")]
-    if glass is not None and robot.channel is not None:
-        lines.append(f"a piece of its channel of {in_words(robot.channel.diameter, 'm')} inner diameter")
-    return lines
 
 
 def _write_png(image: np.ndarray, path: Path, robot: Robot, view: str) -> None:
