@@ -26,8 +26,9 @@ from spirillum.calibration.experiment import Experiment, Quantity, Ratio, channe
 from spirillum.calibration.least_squares import least_squares_fit
 from spirillum.calibration.likelihood import Density
 from spirillum.calibration.posterior import Sampling, sampled
-from spirillum.calibration.problem import Problem, Progress, posed
+from spirillum.calibration.problem import Problem, posed
 from spirillum.errors import InputError
+from spirillum.progress import Progress
 from spirillum.robot.load import PAPER_ROBOTS, load
 
 PAPER_TAILS = tuple((w, a) for w in (10.0, 15.0, 20.0, 25.0) for a in (1.5, 2.0, 2.5, 3.5))

@@ -43,12 +43,13 @@ from spirillum.calibration.least_squares import LeastSquares, least_squares_fit,
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.parameters import LEVEL, UNWALLED, Estimate, assumed_uncertainties, free_names, is_free_in
 from spirillum.calibration.posterior import Posterior, Sampling, sampled
-from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
+from spirillum.calibration.problem import Problem, posed, stated_spread
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.library import TabledTube
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load

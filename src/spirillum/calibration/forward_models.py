@@ -13,7 +13,7 @@ others is their error: no prediction is taken to be better.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -30,6 +30,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, prepared_tables, tables_of
 from spirillum.fluid.tube.stages import StageName
 from spirillum.kernels.native import thread_count
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.robot.robot import Robot, with_numbers
@@ -204,12 +205,12 @@ def tube_forward(
     experiment: Experiment,
     batch: RobotBatch,
     free: Sequence[str],
-    on_progress: Callable[[str, int, int], None],
+    progress: Progress | None,
     *,
     prepare: bool,
 ) -> tuple[Forward, float]:
     """The forward model, and the largest relative error of the robots' tables in speed and body rate."""
-    model = _tables(experiment, batch, on_progress, prepare=prepare)
+    model = _tables(experiment, batch, progress, prepare=prepare)
     level = replace(batch, placement=Placement().model_copy(update={"pitch": 0.0}))
     contact = _contact(experiment, batch) if "friction_coefficient" in free else None
     forward = Forward(TubeResistance.of(level, model), batch.electrics, batch.viscosity, contact=contact)
@@ -217,9 +218,7 @@ def tube_forward(
     return forward, max(error[name] for error in errors for name in ("forward_velocity", "body_rotation_rate"))
 
 
-def _tables(
-    experiment: Experiment, batch: RobotBatch, on_progress: Callable[[str, int, int], None], *, prepare: bool
-) -> TabledTube:
+def _tables(experiment: Experiment, batch: RobotBatch, progress: Progress | None, *, prepare: bool) -> TabledTube:
     """The robots' tables."""
     found = tables_of(batch)
     lacking = [label for label, table in zip(experiment.labels(), found, strict=True) if table is None]
@@ -227,7 +226,7 @@ def _tables(
         otherwise = ", or model 'sbt', which leaves out the walls"
         raise without_tables(experiment, lacking, "model 'tube' asks a table", "straight", otherwise)
     made = (
-        prepared_tables(checked_geometries(experiment.robots), stage="straight", workers=1, progress=on_progress)
+        prepared_tables(checked_geometries(experiment.robots), stage="straight", workers=1, progress=progress)
         if lacking
         else found
     )
@@ -303,20 +302,18 @@ def check_free(free: Sequence[str], model: str) -> None:
         raise InputError(f"free = '{wrong[0]}' with answer = 'trial'; allowed: {', '.join(FREE)}")
 
 
-def trial_surfaces(
-    experiment: Experiment, ends: Ends, on_progress: Callable[[str, int, int], None], *, prepare: bool
-) -> TrialSurfaces:
+def trial_surfaces(experiment: Experiment, ends: Ends, progress: Progress | None, *, prepare: bool) -> TrialSurfaces:
     """Make the trials of all robots and lay surfaces through them."""
     known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
     lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
     if lacking and not prepare:
         raise without_tables(experiment, lacking, "a trial asks a table with yawed poses", "yaw")
     if lacking:
-        prepare_all(experiment.robots, stage="yaw", progress=on_progress)
-    return surfaces_of(experiment.robots, ends, on_progress)
+        prepare_all(experiment.robots, stage="yaw", progress=progress)
+    return surfaces_of(experiment.robots, ends, progress)
 
 
-def surfaces_of(robots: Sequence[Robot], ends: Ends, on_progress: Callable[[str, int, int], None]) -> TrialSurfaces:
+def surfaces_of(robots: Sequence[Robot], ends: Ends, progress: Progress | None) -> TrialSurfaces:
     """Make the trials of robots with tables, and lay surfaces through them."""
     from scipy.stats import qmc
 
@@ -331,7 +328,7 @@ def surfaces_of(robots: Sequence[Robot], ends: Ends, on_progress: Callable[[str,
         table = table_for(RobotBatch.of(robot))
         with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
             for number, measured in enumerate(pool.map(partial(_measured, robot, table), values)):
-                on_progress("trials of the robots", place * count + number, len(robots) * count)
+                tell(progress, "trials of the robots", place * count + number, len(robots) * count)
                 seen[number] = measured
         known = np.isfinite(seen).all(axis=1)
         if known.mean() < _FEWEST:

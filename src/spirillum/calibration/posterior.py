@@ -17,8 +17,9 @@ from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.likelihood import DISCREPANCY_SCALE, ERROR_SCALE, Density
-from spirillum.calibration.problem import Problem, Progress
+from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError, check_range
+from spirillum.progress import Progress, tell
 
 LARGEST_RHAT = 1.01  #: Largest R-hat (rank-normalised, split) of a posterior that may be used.
 FEWEST_EFFECTIVE = 400.0  #: Smallest effective sample size, of bulk and tails.
@@ -93,7 +94,6 @@ def sampled(
 ) -> Posterior:
     """Draw from the posterior."""
     how = sampling or Sampling()
-    on_progress = progress or (lambda _what, _done, _total: None)
     density = Density(problem)
     walkers = how.walkers or max(24, 4 * density.size)
     rng = np.random.default_rng(how.seed)
@@ -102,7 +102,7 @@ def sampled(
     steps, total, warm_up = how.steps, 0, how.warm_up
     for doubling in range(how.doublings + 1):
         for number, (sampler, chain) in enumerate(zip(samplers, chains, strict=True)):
-            on_progress(f"sampling, {total + steps} steps", number, len(samplers))
+            tell(progress, f"sampling, {total + steps} steps", number, len(samplers))
             chain.append(sampler.run(steps, warm_up))
         warm_up = 0
         total += steps
@@ -110,7 +110,7 @@ def sampled(
         found = _thinned(density, [np.concatenate(chain) for chain in chains], samplers, how.kept)
         if found.converged or doubling == how.doublings:
             break
-    on_progress("sampling", 1, 1)
+    tell(progress, "sampling", 1, 1)
     return found
 
 

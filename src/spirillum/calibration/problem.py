@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -33,14 +33,13 @@ from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
-
-Progress = Callable[[str, int, int], None]
 
 
 class UnexplainedError(InputError):
@@ -211,14 +210,13 @@ def posed(
         check_free(free, chosen.name)
     _check_motor(experiment, free, batch)
     parameters = [PARAMETERS[name] for name in free if PARAMETERS[name].scope != "tail"]
-    on_progress = progress or (lambda _what, _done, _total: None)
     ranges: Ranges = {}
     if chosen.placed:
         ranges = place_ranges(batch, chosen, [name for name in free if name in ("gap", "pitch", "roughness")])
         bound = () if answer == RELEASED else free  # in a trial the run has the dry friction
-        forward, error = tube_forward(experiment, batch, bound, on_progress, prepare=prepare)
+        forward, error = tube_forward(experiment, batch, bound, progress, prepare=prepare)
     else:
-        forward, error = _forward(experiment, chosen, batch, parameters, on_progress)
+        forward, error = _forward(experiment, chosen, batch, parameters, progress)
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     friction = np.where(np.isnan(batch.effective_friction), rotor, batch.effective_friction)
     problem = Problem(
@@ -243,7 +241,7 @@ def posed(
     for item in problem.coordinates:
         low, high = (float(item.prior.value(np.array([end]))[0]) for end in (-_REACH, _REACH))
         found[item.parameter.name] = (low, high)
-    trials = trial_surfaces(experiment, found, on_progress, prepare=prepare)
+    trials = trial_surfaces(experiment, found, progress, prepare=prepare)
     return replace(problem, trials=trials, interpolation_error=max(error, trials.error))
 
 
@@ -294,7 +292,7 @@ def _forward(
     model: SwimmerModel,
     batch: RobotBatch,
     parameters: Sequence[FitParameter],
-    on_progress: Progress,
+    progress: Progress | None,
 ) -> tuple[Forward, float]:
     """Resistances, over a table where the wire is free, and the largest error of its interpolation."""
     coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
@@ -304,7 +302,7 @@ def _forward(
     def over(there: RobotBatch, wires: Samples | None = None) -> Forward:
         def told(done: int, total: int) -> None:
             words = "" if wires is None else f", wire of {wires[done] * 1e3:.3g} mm"
-            on_progress(f"{model.name}, {experiment.size} robots{words}", done, total)
+            tell(progress, f"{model.name}, {experiment.size} robots{words}", done, total)
 
         silent = wires is None and model.closed_form
         table = AxialTable.of(

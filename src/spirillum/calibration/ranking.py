@@ -22,13 +22,14 @@ from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, inertia_warnings, synthetic_warning
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, free_names
 from spirillum.calibration.posterior import Sampling
-from spirillum.calibration.problem import Progress, UnexplainedError
+from spirillum.calibration.problem import UnexplainedError
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
+from spirillum.progress import Progress
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.swimming.model_choice import WALLED
 from spirillum.swimming.released_motion import HELD, RELEASED

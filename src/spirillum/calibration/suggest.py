@@ -17,7 +17,7 @@ consecutive draws after another (a jackknife, whose blocks are longer than the d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -38,6 +38,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.library import TabledTube, tabled
 from spirillum.formats.tables import check_present, read_table
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
@@ -123,7 +124,7 @@ def suggest(
     candidates: str | Path | None = None,
     trials: int = 5,
     answer: str = HELD,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Suggestion:
     """Rank candidate robots by the expected information of measuring them.
 
@@ -143,7 +144,6 @@ def suggest(
     check_range("trials", trials, 1, 10**6)
     check_choice("answer", answer, (HELD, RELEASED))
     known = read_posterior(posterior, answer=answer)
-    on_progress = progress or (lambda _what, _done, _total: None)
     given = _papers_robots(known) if robots is None else given_robots(robots)
     _check_channels(given)
     loaded = [known.central(robot) for robot in given]
@@ -153,7 +153,7 @@ def suggest(
     numbers, names = _numbers(known)
     model = find_swimmer_model(known.model)
     for place, robot in enumerate(listed):
-        on_progress("candidates", place, len(listed))
+        tell(progress, "candidates", place, len(listed))
         outside = _outside(known, robot, answer)
         if outside:
             left_out.append(Note.named("candidate-left-out", robot=tail_words(robot), outside=outside))
@@ -208,7 +208,7 @@ def _trial_kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Sample
 
     ends = {name: (float(draws.min()), float(draws.max())) for name, draws in known.draws.items() if name in FREE}
     try:
-        surfaces = surfaces_of([robot], ends, lambda _what, _done, _total: None)
+        surfaces = surfaces_of([robot], ends, None)
     except InputError as error:
         return str(error)
     advance, turning, _ = surfaces.at(known.draws)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from spirillum.designs.search import CONFIRMED, Archive, best_apart, best_design
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -34,8 +35,6 @@ _SETS = 16  # independent sets of these draws, from which the interval of a prob
 _FRONT_POINTS = 13
 _MOST_OF_STEP_OUT = 0.95  # share of the step-out rate above which a warning states the margin
 _STATED_SEED = 7919  # added to the seed for the draws of what is stated
-
-Progress = Callable[[str, int, int], None]
 
 
 def design(
@@ -110,24 +109,24 @@ def design(
         return Evaluation(space, chosen, objectives, conditions, manufacturability, samples, options.confidence, rate)
 
     searched = under(unknowns.draws(options.draws, options.seed))
-    archive, on_progress = Archive(), progress or (lambda _what, _done, _total: None)
+    archive = Archive()
     learned = None
     if is_learned(chosen, space, unknowns):
-        searched, archive, best, learned = learned_best(searched, unknowns, choice.model, options.seed, on_progress)
+        searched, archive, best, learned = learned_best(searched, unknowns, choice.model, options.seed, progress)
     else:
-        best = best_design(searched, archive, seed=options.seed, on_progress=on_progress)
+        best = best_design(searched, archive, seed=options.seed, progress=progress)
     if not best.possible:
         raise InputError(_none_is_possible(searched, best.shares, archive))
     front = None
     if len(objectives) > 1:
-        front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, on_progress=on_progress)
+        front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, progress=progress)
     drawn = unknowns.draws(_MORE_DRAWS * options.draws, options.seed + _STATED_SEED, _SETS)
     stated = replace(searched, samples=drawn)
     answer = _answer(given, unknowns, searched, stated, best.shares, archive, front)
     answer = replace(answer, learned=learned, model_reason=choice.reason)
     if choice.model == WALLED and rate is None and posterior is None:
         built = [(shares, _built(given, space, shares)) for shares in answer.leading]
-        answer = replace(answer, confirmed=confirmed(built, make_tables=options.confirm, progress=on_progress))
+        answer = replace(answer, confirmed=confirmed(built, make_tables=options.confirm, progress=progress))
     elif options.confirm:
         raise InputError("confirm = True, but trials follow from the drive in the tube; allowed: model 'tube' alone")
     return replace(answer, warnings=(*answer.warnings, *lead_warnings(answer)))

@@ -21,13 +21,14 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.designs.criteria import TURNS, Space, Variable
 from spirillum.designs.design_result import Learned
 from spirillum.designs.evaluation import Evaluation, Unknowns
-from spirillum.designs.search import Archive, Found, Progress, best_design
+from spirillum.designs.search import Archive, Found, best_design
 from spirillum.errors import InputError
 from spirillum.fluid.closed.sbt import Sbt
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.fluid.tube.domain import pose_limits
 from spirillum.fluid.wire.slender import Slender
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold
 from spirillum.robot.robot import Robot
@@ -257,23 +258,23 @@ Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 
 
 def learned_best(
-    blank: Evaluation, unknowns: Unknowns, name: str, seed: int, on_progress: Progress, solve: Solve | None = None
+    blank: Evaluation, unknowns: Unknowns, name: str, seed: int, progress: Progress | None, solve: Solve | None = None
 ) -> tuple[Evaluation, Archive, Found, Learned]:
     """Designs with the learned model, all that the last search has evaluated, the best, and how well it is known."""
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
     empty = replace(blank, model=Corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))
     first = _first_designs(empty, own, seed)
-    points = _solved(empty, first, own, solving, on_progress, None)
+    points = _solved(empty, first, own, solving, progress, None)
     last = 1.0
     for number in range(_ROUNDS):
         evaluation, archive = replace(blank, model=Corrected(name, points)), Archive()
-        best = best_design(evaluation, archive, seed=seed, on_progress=on_progress)
+        best = best_design(evaluation, archive, seed=seed, progress=progress)
         if not best.possible or last <= _AGREES:
             break
         before = _objective(evaluation, best.shares)
         more = [best.shares, *_runner_up(evaluation, archive, best.shares, number)]
-        points = _solved(empty, np.stack(more), own, solving, on_progress, points)
+        points = _solved(empty, np.stack(more), own, solving, progress, points)
         after = _objective(replace(blank, model=Corrected(name, points)), best.shares)
         last = abs(before / after - 1.0) if after else abs(before - after)
     return evaluation, archive, best, Learned(len(points.features), last, _left_out(evaluation, name, points))
@@ -314,7 +315,7 @@ def _solved(
     shares: Samples,
     own: tuple[Variable, ...],
     solving: Solve,
-    on_progress: Progress,
+    progress: Progress | None,
     points: Points | None,
 ) -> Points:
     """Solve for designs one by one, first of all for today's, and add what they teach."""
@@ -323,7 +324,7 @@ def _solved(
         today = RobotBatch.of(empty.space.robot)
         batches = [*([today] if bool(np.all(all_hold(empty.limits(None)))) else []), *batches]
     for number, batch in enumerate(batches):
-        on_progress("tails that are solved for", number, len(batches))
+        tell(progress, "tails that are solved for", number, len(batches))
         more = solving(batch, own)
         points = more if points is None else points.joined(more)
     assert points is not None  # noqa: S101 - there is a design

@@ -7,7 +7,7 @@ they are and not by chance. The best design is then refined by the simplex of Ne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,13 +16,13 @@ import numpy as np
 from spirillum.arrays import Flags, Samples
 from spirillum.designs.evaluation import BROKEN, REFUSED, Evaluation
 from spirillum.dynamics.prediction import predict
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.preparation import preparation_time, prepare_all
 from spirillum.swimming.released_motion import ReleasedMotion
 
-Progress = Callable[[str, int, int], None]
 _GENERATIONS = 60
 _POPULATION = 12  # designs of a generation for each variable
 _FEWEST = 24
@@ -76,12 +76,12 @@ def best_design(
     objective: int = 0,
     above: tuple[int, float] | None = None,
     start: Samples | None = None,
-    on_progress: Progress | None = None,
+    progress: Progress | None = None,
 ) -> Found:
     """Minimise the cost of one objective."""
     from scipy.optimize import Bounds, differential_evolution, minimize
 
-    size, notify = evaluation.space.size, on_progress or (lambda _what, _done, _total: None)
+    size = evaluation.space.size
     done = [0]
 
     def costs(shares: Samples) -> Samples:
@@ -99,7 +99,7 @@ def best_design(
 
     def generation(intermediate_result: Any) -> bool:
         done[0] += 1
-        notify("designs", min(done[0], _GENERATIONS), _GENERATIONS)
+        tell(progress, "designs", min(done[0], _GENERATIONS), _GENERATIONS)
         energies = np.asarray(intermediate_result.population_energies)
         # SciPy's own criterion is relative to the mean, which is large as long as designs are refused.
         return bool(energies.max() < BROKEN and np.ptp(energies) <= _CONVERGED * abs(energies.min()))
@@ -146,20 +146,22 @@ def best_design(
     return Found(best, cost, bool(np.isfinite(final.values[objective, 0])))
 
 
-def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points: int, on_progress: Progress) -> Samples:
+def pareto_front(
+    evaluation: Evaluation, archive: Archive, *, seed: int, points: int, progress: Progress | None
+) -> Samples:
     """Designs of which none is better in both objectives, (points, variables), from one extreme to the other.
 
     The best of the first objective is sought with the second bounded (epsilon-constraint method, Haimes et al. 1971),
     for bounds that lie evenly between the extremes. Each search begins where all before it have been.
     """
-    on_progress("designs on the front", 0, points)
+    tell(progress, "designs on the front", 0, points)
     ends = [best_design(evaluation, archive, seed=seed, objective=n) for n in (0, 1)]
     if not all(end.possible for end in ends):
         return np.stack([end.shares for end in ends])
     costs = [evaluation.scores(end.shares[None]).cost[1, 0] for end in ends]
     found = [ends[0].shares]
     for number in range(1, points - 1):
-        on_progress("designs on the front", number, points)
+        tell(progress, "designs on the front", number, points)
         bound = float(costs[0] + (costs[1] - costs[0]) * number / (points - 1))
         shares, values = archive.all()
         signs = [1.0 if item.target is not None else item.sign for item in evaluation.objectives]
@@ -172,7 +174,7 @@ def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points:
         one = best_design(evaluation, archive, seed=seed + number, above=(1, bound), start=start)
         found.append(one.shares)
     found.append(ends[1].shares)
-    on_progress("designs on the front", points, points)
+    tell(progress, "designs on the front", points, points)
     return _undominated(evaluation, np.stack(found))
 
 
@@ -220,15 +222,14 @@ def confirmed(
     designs: Sequence[tuple[Samples, Robot]],
     *,
     make_tables: bool,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[ConfirmedDesign, ...]:
     """Return the trials of designs, or the reasons why there are none."""
     if make_tables:
         prepare_all([robot for _, robot in designs], stage="yaw", progress=progress)
     found = []
     for number, (shares, robot) in enumerate(designs):
-        if progress is not None:
-            progress("trials of the best designs", number, len(designs))
+        tell(progress, "trials of the best designs", number, len(designs))
         found.append(ConfirmedDesign(shares, robot, *_trial_of(robot)))
     return tuple(found)
 

@@ -17,6 +17,7 @@ from spirillum.notes import notes_in
 from spirillum.pages.job import BackgroundJob, worker
 from spirillum.pages.knobs import MODELS, Settings, report_fault
 from spirillum.pages.robot_data import SERIES, SampleRecording, axial_forces_of, finite, quantity_list, shape_of
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot, robot_text
@@ -65,7 +66,7 @@ def plane_shown(plane: xr.Dataset, phase: float) -> dict[str, Any]:
     }
 
 
-def _flowing(request: dict[str, Any], progress: Callable[[str, int, int], None]) -> dict[str, Any]:
+def _flowing(request: dict[str, Any], progress: Progress) -> dict[str, Any]:
     from spirillum.fields.flow import FLOW_MODELS, flow
 
     model = request["model"] if request["model"] in FLOW_MODELS else "slender"

@@ -16,6 +16,7 @@ from spirillum.pages.knobs import Settings, number_of, refusal_of, report_fault,
 from spirillum.pages.page_robot import Built, PageRobot, build
 from spirillum.pages.robot_data import prediction_answer, quantity_list, released_answer
 from spirillum.pages.study_picture import StudyPicture
+from spirillum.progress import Progress
 from spirillum.robot.load import preset_names
 from spirillum.robot.robot import Robot, robot_text
 from spirillum.swimming.model_choice import WALLED
@@ -30,7 +31,7 @@ class Preparing(BackgroundJob):
         self.robot = robot
 
 
-def _prepared(request: dict[str, Any], progress: Callable[[str, int, int], None]) -> dict[str, Any]:
+def _prepared(request: dict[str, Any], progress: Progress) -> dict[str, Any]:
     from spirillum.swimming.preparation import prepare
 
     prepare(tomllib.loads(request["robot"]), progress=progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -30,10 +30,9 @@ from spirillum.papers.case import (
 from spirillum.papers.claim import Claim, Verdict
 from spirillum.papers.registry import claims_of
 from spirillum.papers.studies import study_of
+from spirillum.progress import Progress, tell
 from spirillum.studies.run import computed_study, study_fingerprint
 from spirillum.studies.study_loader import load_study
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -248,7 +247,7 @@ def compute_case(name: str, progress: Progress | None = None, *, runs: bool = Fa
     if case.claims:
         loaded = load_study(study_of(case.claims))
         fingerprint = study_fingerprint(loaded, None)
-        more = claims_of(computed_study(loaded, None, fingerprint, None, lambda _what, _done, _total: None))
+        more = claims_of(computed_study(loaded, None, fingerprint, None, None))
         stated: list[Provenance] = ["text"] * len(more)
         claims, read = [*claims, *more], [*read, *stated]
     return CaseResult(name, case, rows, tuple(claims), tuple(read))
@@ -268,11 +267,9 @@ def _values(name: str, case: Case, progress: Progress | None, *, runs: bool) -> 
     work = [(case.point(label), trial) for label in wanted for trial in (None, *trials_of(case, case.point(label)))]
     values: _Values = {}
     for done, (point, trial) in enumerate(work):
-        if progress:
-            progress(name, done, len(work))
+        tell(progress, name, done, len(work))
         values[point.label, *_key(trial)] = values_at(case, point, wanted[point.label], trial, progress)
-    if progress:
-        progress(name, len(work), len(work))
+    tell(progress, name, len(work), len(work))
     return values
 
 

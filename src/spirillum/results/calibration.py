@@ -17,11 +17,11 @@ import numpy as np
 from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.posterior import Sampling
-from spirillum.calibration.problem import Progress
 from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inputs, output_folder, results_folder
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.formats.templates import rendered
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.results.page import Drawings, draw_together, load_figures
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
@@ -253,11 +253,10 @@ def _drawn(
     beside: ProcessPoolExecutor | None,
 ) -> list[Path]:
     drawings = _drawings(found)
-    on_progress = progress or (lambda _what, _done, _total: None)
     written = draw_together(
         drawings,
         output_folder(folder / "figures", folder),
-        lambda name, done: on_progress(f"figure {name}", done, len(drawings)),
+        lambda name, done: tell(progress, f"figure {name}", done, len(drawings)),
         vector=vector,
         again=partial(_drawings, found),
         beside=beside,

@@ -23,6 +23,7 @@ from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
+from spirillum.progress import Progress
 from spirillum.results.page import draw_pictures, load_figures
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_store import stored_study
@@ -31,7 +32,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tables import Drive, Motor
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit_of_ranked
-from spirillum.studies.run import Progress, computed_study, make_tables, study_fingerprint
+from spirillum.studies.run import computed_study, make_tables, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
 from spirillum.studies.study_loader import LARGEST_STUDY, load_study, observed_arrays
 from spirillum.view.figures.comparison import ranking_picture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from spirillum.formats.templates import rendered
 from spirillum.papers.case import case_names, load_case
 from spirillum.papers.validation import CaseResult, Validation, compute_case
 from spirillum.papers.validation_figure import case_picture
+from spirillum.progress import Progress
 from spirillum.results.page import draw_pictures
 
 _RESULTS = ("validation.json", "figures", "report.html")
@@ -23,7 +24,7 @@ def validate(
     *,
     runs: bool = False,
     output: str | Path | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Validation:
     """Compute published experiments and computations of other groups, with nothing fitted.
 

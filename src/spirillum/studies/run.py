@@ -21,6 +21,7 @@ from spirillum.fluid.tube.library import TabledTube, prepared_tables
 from spirillum.fluid.tube.progress_messages import ANNOUNCED, LEVEL, SOLUTION, time_now
 from spirillum.fluid.tube.stages import StageName
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
@@ -121,9 +122,6 @@ def _kept_at_times(folder: Path | None) -> Iterator[Callable[[int, StudyTask, Pa
 _PERIOD = 1.0  # between two times at which answers are kept, s: to write one whole takes as long as a quick answer
 
 
-Progress = Callable[[str, int, int], None]  #: Called with what is being done, steps done and steps in all.
-
-
 _Task = TypeVar("_Task", bound=StudyTask)
 
 
@@ -138,7 +136,7 @@ def computed_study(
     observed: ObservedArrays | None,
     fingerprint: str,
     parts: Path | None,
-    tell: Progress,
+    progress: Progress | None,
     pool: WorkerPool | None = None,
 ) -> xr.Dataset:
     """The dataset of a study; finished parts are kept in and reused from the folder `parts`."""
@@ -165,8 +163,8 @@ def computed_study(
             words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
             fast, slow = SOLUTION[LEVEL]
             takes = time_now((count * fast, count * slow), (pool or WorkerPool()).workers)
-            tell(f"{ESTIMATE}{words}, in {takes}; `prepare` makes tables", 0, 0)
-        tell(missing[0].words, done, len(requested))
+            tell(progress, f"{ESTIMATE}{words}, in {takes}; `prepare` makes tables", 0, 0)
+        tell(progress, missing[0].words, done, len(requested))
     jobs = (requested[number].job(loaded, observed)._replace(number=number) for number in numbers)
     at_work = _worth(missing, pool or WorkerPool())
     with _kept_at_times(parts) as finished:
@@ -174,8 +172,8 @@ def computed_study(
             found[job.number] = part
             finished(job.number, requested[job.number], part)
             done += 1
-            tell(requested[job.number].words, done, len(requested))
-    tell("dataset", len(requested), len(requested))
+            tell(progress, requested[job.number].words, done, len(requested))
+    tell(progress, "dataset", len(requested), len(requested))
 
     def answered(kind: type[_Task]) -> list[tuple[_Task, Part]]:
         pairs = zip(requested, found, strict=True)
@@ -258,7 +256,7 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[Note]:
     )
 
 
-def make_tables(loaded: LoadedStudy, pool: WorkerPool, tell: Progress) -> None:
+def make_tables(loaded: LoadedStudy, pool: WorkerPool, progress: Progress) -> None:
     """Make the tables that robots lack in their tubes, where the study left the choice of the model to the program."""
     if not loaded.makes_tables:
         return
@@ -266,8 +264,8 @@ def make_tables(loaded: LoadedStudy, pool: WorkerPool, tell: Progress) -> None:
     missing = dict.fromkeys(one for _, batch in groups(loaded) for one in missing_tables(batch, stage))
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
-        tell(f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
-        prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=tell)
+        tell(progress, f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
+        prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=progress)
 
 
 def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[Note]:

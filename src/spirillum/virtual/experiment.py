@@ -31,6 +31,7 @@ from spirillum.files import (
     written_by_us,
 )
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
@@ -132,7 +133,7 @@ def virtual_experiment(
     degradation: str | Degradation | Mapping[str, Any] | None = None,
     seed: int = 0,
     jobs: int = 1,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> VirtualExperiment:
     """Render several trials of each robot of a study; all of it is synthetic.
 
@@ -199,7 +200,7 @@ def virtual_experiment(
         for name in robots:
             output_folder(folder / name, folder)
         render_one = _renderer(folder, camera, degradation)
-        _render_all(render_one, missing, len(planned), plan.jobs, progress or (lambda _what, _done, _total: None))
+        _render_all(render_one, missing, len(planned), plan.jobs, progress)
         table = folder / _TABLE
         write_text(table, _table(planned))
     return VirtualExperiment(
@@ -355,20 +356,18 @@ def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> 
     return render_one
 
 
-def _render_all(
-    render_one: _Render, missing: list[Planned], total: int, jobs: int, on_progress: Callable[[str, int, int], None]
-) -> None:
+def _render_all(render_one: _Render, missing: list[Planned], total: int, jobs: int, progress: Progress | None) -> None:
     """Render what is missing; after an interruption, finished trials stay and no unfinished one is left."""
     stop = threading.Event()
     done = total - len(missing)
-    on_progress("virtual experiment", done, total)
+    tell(progress, "virtual experiment", done, total)
     with ThreadPoolExecutor(jobs) as pool:
         labels = {pool.submit(render_one, planned, stop): planned.label for planned in missing}
         try:
             for future in as_completed(labels):
                 future.result()
                 done += 1
-                on_progress(labels[future], done, total)
+                tell(progress, labels[future], done, total)
         except BaseException:
             stop.set()
             for future in labels:

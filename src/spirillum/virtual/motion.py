@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
@@ -105,7 +105,7 @@ def motion_of_trial(
     motion: MotionOptions,
     trial: TrialOptions,
     camera: CameraOptions,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> TrialMotion:
     """The motion of a trial in the robot's tube, as `spirillum.simulate` has it by its defaults."""
     from spirillum.dynamics.simulation import simulate

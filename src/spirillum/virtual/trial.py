@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,6 +29,7 @@ from spirillum.files import (
 )
 from spirillum.formats.h264 import H264Writer, h264_writer
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
@@ -176,7 +177,7 @@ def _shown(
     motion: MotionOptions,
     trial: TrialOptions,
     camera: CameraOptions,
-    progress: Callable[[str, int, int], None] | None,
+    progress: Progress | None,
 ) -> tuple[Robot, TrialMotion]:
     from spirillum.dynamics.run_file import open_run, robot_of
 
@@ -206,7 +207,7 @@ def render(
     troubles: str | Troubles | Mapping[str, Any] | None = None,
     setup: str | Path | None = None,
     seed: int = 0,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> VirtualTrial:
     """Render a video of a swimming robot as an experiment's camera sees it; all of it is synthetic.
 
@@ -291,7 +292,6 @@ def render(
     frames = FrameEncoder(
         painter, disturbances, trajectory, camera.exposure, ViewArtifacts(troubles, seed, camera.size)
     )
-    on_progress = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (
         guard_inputs(*inputs),
@@ -301,8 +301,8 @@ def render(
         for file, text in beside.items():
             parts[file].write_text(text, encoding="utf-8")
         write_dataset(truth, parts[names["nc"]])
-        _write_frames(writer, frames, (kept, counted), camera.fps, on_progress)
-        on_progress("render: writing", len(kept), len(kept))
+        _write_frames(writer, frames, (kept, counted), camera.fps, progress)
+        tell(progress, "render: writing", len(kept), len(kept))
     return written
 
 
@@ -358,14 +358,14 @@ def _write_frames(
     frames: FrameEncoder,
     numbers: tuple[np.ndarray, np.ndarray],
     fps: float,
-    on_progress: Callable[[str, int, int], None],
+    progress: Progress | None,
 ) -> None:
     """Render frames in parallel with the encoding; `numbers`: as recorded, and as the video counts them."""
     kept, counted = numbers
     with ThreadPoolExecutor(1) as encoder:
         before: Future[None] | None = None
         for done, number in enumerate(kept):
-            on_progress("render", done, len(kept))
+            tell(progress, "render", done, len(kept))
             image = frames.image(number / fps)
             if before is not None:
                 before.result()

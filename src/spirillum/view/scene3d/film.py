@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.robot import Robot
 from spirillum.units import display_unit, show
 from spirillum.view.figures.run_panels import silhouette
@@ -135,7 +136,7 @@ def film(
     fps: int = 30,
     speed: float | None = None,
     camera: str = "auto",
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Film:
     """Render a video of a run; in a tube with the cross-section in a corner.
 
@@ -178,13 +179,12 @@ def film(
     if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
     shots = _Shots(solids, poses, view, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
-    on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, _about(dataset, model), speed)) as images:
             for number, image in enumerate(images):
-                on_progress("film", number, times.size)
+                tell(progress, "film", number, times.size)
                 writer.add(image)
-        on_progress("film: writing", times.size, times.size)
+        tell(progress, "film: writing", times.size, times.size)
     return Film(target, robot, model, times.size, pixels, fps, speed, follows, turn, warnings)
 
 
