@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from spirillum.errors import InputError, failure_sentence
 from spirillum.pages.knobs import report_fault
+from spirillum.progress import Progress
 
 _Answer = TypeVar("_Answer")
 
@@ -46,9 +47,6 @@ async def run_in_background(work: Callable[..., _Answer], *arguments: Any) -> _A
 
     Thread(target=run, name="page: request", daemon=True).start()
     return await future
-
-
-Tell = Callable[..., None]  #: Callback of progress messages, by name.
 
 
 class BackgroundJob:
@@ -97,7 +95,7 @@ class BackgroundJob:
         self._tell()
 
 
-def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Mapping[str, Any]]) -> None:
+def worker(work: Callable[[dict[str, Any], Progress], Mapping[str, Any]]) -> None:
     """Run the task of standard input and report its progress."""
     # The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
 

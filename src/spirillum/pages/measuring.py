@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from spirillum.pages.job import worker
-
-_Tell = Callable[[str, int, int], None]
+from spirillum.progress import Progress
 
 
 def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
@@ -55,7 +54,7 @@ def _row(label: str, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _work(request: dict[str, Any], progress: _Tell) -> dict[str, Any]:
+def _work(request: dict[str, Any], progress: Progress) -> dict[str, Any]:
     output = Path(request["output"])
     if request["what"] == "calibrate":
         from spirillum.results.calibration import calibrate

@@ -8,7 +8,7 @@ import threading
 import time
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from spirillum.errors import InputError, failure_sentence
 from spirillum.pages.job import BackgroundJob, worker
@@ -50,6 +50,8 @@ _UNTOUCHED = 2.0  # time for which a robot is left as it is before its table is 
 _PAUSE = 0.2  # rest of the thread of the simulation after a fault, s
 
 _COLUMNS_AFTER = 1.0  # time for which a robot is left as it is before its trial and steady motion are computed, s
+
+_Work = TypeVar("_Work")
 
 Command = tuple[Mapping[str, Any], Callable[[str], None]]  #: Command of a client, and the callback for its refusal.
 
@@ -312,22 +314,31 @@ class SimulationThread:
             self._wanted[index] = (swimmer.generation, swimmer.revision, known, swimmer.settings, *robots)
             self._work.notify_all()
 
-    def _build(self) -> None:
-        while not self._ending.is_set():
+    def _each_of(self, waiting: dict[int, _Work]) -> Iterator[tuple[int, _Work]]:
+        """Robots with the work that waits for a thread, as it comes, until the page ends."""
+        while True:
             with self._work:
-                while not self._wanted and not self._ending.is_set():
-                    self._work.wait()
+                self._work.wait_for(lambda: waiting or self._ending.is_set())
                 if self._ending.is_set():
                     return
-                index = next(iter(self._wanted))
-                generation, revision, model, settings, robot, predicted = self._wanted.pop(index)
+                index = next(iter(waiting))
+                work = waiting.pop(index)
+            yield index, work
+
+    def _build(self) -> None:
+        """Release robots, and compute their held numbers."""
+        for index, (generation, revision, known, settings, robot, predicted) in self._each_of(self._wanted):
             try:
+                model = known
                 if not model:
                     built = build(settings, robot)
                     model = built.model
                     self._built.put((index, generation, revision, built, None, ""))
                     self._wake_up()
-                numbers = self._numbers(predicted, settings, model)
+                from spirillum.swimming.prediction import predict
+
+                placement = settings.placement() if model == "tube" else None
+                numbers = prediction_answer(predict(predicted, model=model, placement=placement))
                 self._built.put((index, generation, revision, None, numbers, ""))
                 if numbers["columns"]:
                     with self._work:
@@ -338,23 +349,11 @@ class SimulationThread:
                 self._built.put((index, generation, revision, None, None, failure_sentence(error)))
             self._wake_up()
 
-    def _numbers(self, robot: Robot, settings: Settings, model: str) -> dict[str, Any]:
-        from spirillum.swimming.prediction import predict
-
-        placement = settings.placement() if model == "tube" else None
-        return prediction_answer(predict(robot, model=model, placement=placement))
-
     def _release(self) -> None:
         """Compute trial and steady motion beside held numbers, one column after the other."""
-        while not self._ending.is_set():
-            with self._work:
-                while not self._released and not self._ending.is_set():
-                    self._work.wait()
-                if self._ending.is_set():
-                    return
-                index = next(iter(self._released))
-                generation, revision, numbers, settings, robot = self._released.pop(index)
+        for index, (generation, revision, held, settings, robot) in self._each_of(self._released):
             try:
+                numbers = held
                 for name, motion in self._columns(index, revision, settings, robot):
                     numbers = {**numbers, "columns": {**numbers["columns"], name: released_answer(motion)}}
                     self._built.put((index, generation, revision, None, numbers, ""))
