@@ -168,11 +168,7 @@ class HeldTask(OneRobot):
     placement: Placement
 
     needed = frozenset(MOVING)
-
-    @property
-    def words(self) -> str:
-        """Progress message."""
-        return f"held, model {WALLED}: {self.robot.with_tail}"
+    followed = f"held, model {WALLED}"
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute every quantity, (1,); NaN for a robot outside the model's domain."""

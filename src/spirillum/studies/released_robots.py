@@ -124,11 +124,7 @@ class ReleaseTask(OneRobot):
     ranges: LaidDown
 
     needed = frozenset({*AT_RUNS, *INFERRED, "laid_pitch"})
-
-    @property
-    def words(self) -> str:
-        """Progress message."""
-        return f"runs after release: {self.robot.with_tail}"
+    followed = "runs after release"
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`.
@@ -251,11 +247,7 @@ class SettledTask(OneRobot):
     contact: Contact  #: What it rests on.
 
     needed = frozenset({*SETTLED, *POSE, "error_estimate", "near", "state"})
-
-    @property
-    def words(self) -> str:
-        """Progress message."""
-        return f"steady state: {self.robot.with_tail}"
+    followed = "steady state"
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -210,7 +210,13 @@ class ModelTask(OneModel):
 class OneRobot(StudyTask):
     """One robot that is followed in its tube, as a separate task."""
 
+    followed: ClassVar[str]  #: What is followed, for the progress message.
     robot: Robot
+
+    @property
+    def words(self) -> str:
+        """Progress message."""
+        return f"{self.followed}: {self.robot.with_tail}"
 
     @property
     def index(self) -> int:
