@@ -1,7 +1,5 @@
 """Annotated frames: words large enough to be read and no surer than the stripes are; large frames are reduced."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -9,6 +7,7 @@ from spirillum.robot.load import load
 from spirillum.view import annotate
 from spirillum.view.annotate import Annotator, _degrees, _lines_of
 from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.track.steps import FrameDetection
 
 pytest.importorskip("cv2")
 
@@ -16,7 +15,7 @@ pytest.importorskip("cv2")
 def annotated(width: int, height: int, period: float = np.pi) -> tuple[np.ndarray, np.ndarray]:
     """A grey picture and what was drawn on it."""
     optics = Optics((width, height), 1.1 * width, 0.2, 0.015)
-    seen = SimpleNamespace(time=1.0, pose=BodyPose(0.0, 0.0, 0.0), body_angle=0.7, tail_phase=2.0, optics=optics)
+    seen = FrameDetection(1.0, BodyPose(0.0, 0.0, 0.0), body_angle=0.7, tail_phase=2.0, optics=optics)
     picture = np.full((height, width, 3), 200, dtype=np.uint8)
     return picture, Annotator(load("biorob2012-wide"), period).draw(picture, seen)
 

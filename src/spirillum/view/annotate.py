@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from queue import Queue
-from threading import Thread
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from spirillum.vision.camera.optics import BodyPose, Optics
+    from spirillum.vision.track.steps import FrameDetection
 
 _BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
 _INK = (255, 255, 255)
@@ -32,30 +33,6 @@ _SHIFT = 4  # subpixel resolution of lines: sixteenths
 _TICKS = 90_000
 _QUALITY = {"crf": "23", "preset": "ultrafast"}
 _LARGEST = 1920  # longest side of an annotated frame, pixels: a larger one is reduced by a whole number
-
-
-class AnnotatedFrame(Protocol):
-    """The tracker's result for a frame."""
-
-    @property
-    def time(self) -> float:
-        """Time in the video, s."""
-
-    @property
-    def pose(self) -> BodyPose | None:
-        """Pose of the body; None where it was not seen."""
-
-    @property
-    def body_angle(self) -> float:
-        """Roll, rad; NaN where it was not read."""
-
-    @property
-    def tail_phase(self) -> float:
-        """Phase of the tail, rad; NaN where it was not read."""
-
-    @property
-    def optics(self) -> Optics:
-        """The camera."""
 
 
 class Annotator:
@@ -75,7 +52,7 @@ class Annotator:
         self._seal = robot.seal.length if robot.seal else 0.3 * body.length
         self._first: float | None = None
 
-    def draw(self, image: np.ndarray, seen: AnnotatedFrame, *, in_place: bool = False) -> np.ndarray:
+    def draw(self, image: np.ndarray, seen: FrameDetection, *, in_place: bool = False) -> np.ndarray:
         """Return a frame with the tracking result, at most 1920 pixels wide; drawn `in_place` if its size allows."""
         picture, times = self._reduced(image, in_place=in_place)
         pose = seen.pose
@@ -116,7 +93,7 @@ class Annotator:
         whole = np.ascontiguousarray(image[: height * times, : width * times])
         return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
 
-    def _dials(self, picture: np.ndarray, seen: AnnotatedFrame) -> None:
+    def _dials(self, picture: np.ndarray, seen: FrameDetection) -> None:
         """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root."""
         # Where stripes repeat, the body has a hand for each that may be stripe 1.
         radius = _DIAL * _unit(picture)
@@ -147,7 +124,7 @@ class Annotator:
                 part = rear + self._seal * np.array([start, start + 0.3])
                 line(np.stack([part, np.full(2, y), np.full(2, 0.0)], axis=1), _POINTER)
 
-    def _along(self, seen: AnnotatedFrame) -> float:
+    def _along(self, seen: FrameDetection) -> float:
         assert seen.pose is not None  # noqa: S101 - called only where it was detected
         if self._first is None:
             self._first = seen.pose.x
@@ -219,27 +196,35 @@ def annotated_film(
     *,
     period: float = 2.0 * math.pi,
     waiting: int = 8,
-) -> Iterator[Callable[[int, np.ndarray, AnnotatedFrame], None]]:
+) -> Iterator[Callable[[int, np.ndarray, FrameDetection], None]]:
     """Video of annotated frames at their true times, rendered and encoded in a separate thread."""
     annotator = Annotator(robot, period)
     kept: list[np.ndarray] = []
 
-    def drawn(index: int, image: np.ndarray, seen: AnnotatedFrame) -> np.ndarray:
+    def drawn(index: int, image: np.ndarray, seen: FrameDetection) -> np.ndarray:
         picture = annotator.draw(image, seen, in_place=True)  # nobody looks at the frame any more
         if seen.pose is not None and (not kept or index & (index - 1) == 0):
             kept[:] = [picture]  # frames 1, 2, 4, 8 ...: the last of them lies in the second half
         return picture
 
-    writer = _Writer(path, words, drawn, waiting)
+    import_optional("av", "an annotated video", "video")  # raises here, before any frame is tracked
+    queue: Queue[tuple[int, np.ndarray, FrameDetection] | None] = Queue(waiting)
+    frames = iter(queue.get, None)
 
-    def on_frame(index: int, image: np.ndarray, seen: AnnotatedFrame) -> None:
-        writer.add((index, image, seen))
+    def encode() -> None:
+        try:
+            _encode(path, words, ((drawn(*frame), frame[2].time) for frame in frames))
+        finally:
+            for _ in frames:  # after an error, so that nobody waits for the queue
+                pass
 
-    try:
-        yield on_frame
-    finally:
-        writer.close()
-    writer.check()
+    with ThreadPoolExecutor(1) as pool:
+        encoded = pool.submit(encode)
+        try:
+            yield lambda index, image, seen: queue.put((index, image, seen))
+        finally:
+            queue.put(None)
+    encoded.result()
     if thumbnail is not None and kept:
         thumbnail(_jpeg(kept[0]))
 
@@ -260,74 +245,24 @@ def _jpeg(picture: np.ndarray) -> bytes:
     return bytes(data) if good else b""
 
 
-_Frame = tuple[int, np.ndarray, AnnotatedFrame]  # a frame's number, its picture and its observation
-
-
-class _Writer:
-    """Thread that renders frames and encodes them (H.264); the video starts with the first frame's time."""
-
-    def __init__(
-        self,
-        path: Path,
-        words: dict[str, str],
-        drawn: Callable[[int, np.ndarray, AnnotatedFrame], np.ndarray],
-        waiting: int,
-    ) -> None:
-        import_optional("av", "an annotated video", "video")  # raises here, before any frame is tracked
-        self._path, self._words, self._drawn = path, words, drawn
-        self._queue: Queue[_Frame | None] = Queue(waiting)
-        self._error: BaseException | None = None
-        self._ended = False
-        self._thread = Thread(target=self._run, name="encoding", daemon=True)
-        self._thread.start()
-
-    def add(self, frame: _Frame) -> None:
-        """Append a frame."""
-        self._queue.put(frame)
-
-    def close(self) -> None:
-        """Write what is left."""
-        self._queue.put(None)
-        self._thread.join()
-
-    def check(self) -> None:
-        """Raise the error of the encoding thread."""
-        if self._error is not None:
-            raise self._error
-
-    def _run(self) -> None:
-        try:
-            self._encode()
-        except Exception as error:
-            self._error = error
-        while not self._ended:  # after an error, so that nobody waits for the queue
-            self._next()
-
-    def _next(self) -> _Frame | None:
-        item = self._queue.get()
-        self._ended = item is None
-        return item
-
-    def _encode(self) -> None:
-        item = self._next()
-        if item is None:
-            raise InputError(f"{self._path.name} has no frames; allowed: a video with at least one")
-        picture = self._drawn(*item)
-        height, width = (even - even % 2 for even in picture.shape[:2])
-        size, first, last = (width, height), item[2].time, -1
-        with h264_writer(
-            self._path,
-            size,
-            Fraction(30),
-            self._words,
-            quality=_QUALITY,
-            tick=Fraction(1, _TICKS),
-            threads=1,
-            instead="--no-annotated",
-            extra="video",
-        ) as film:
-            while item is not None:
-                last = max(last + 1, round((item[2].time - first) * _TICKS))
-                film.add(picture[:height, :width], last)
-                item = self._next()
-                picture = picture if item is None else self._drawn(*item)
+def _encode(path: Path, words: dict[str, str], pictures: Iterator[tuple[np.ndarray, float]]) -> None:
+    """Encode pictures with their times (H.264); the video starts with the first one's."""
+    first = next(pictures, None)
+    if first is None:
+        raise InputError(f"{path.name} has no frames; allowed: a video with at least one")
+    height, width = (even - even % 2 for even in first[0].shape[:2])
+    last = -1
+    with h264_writer(
+        path,
+        (width, height),
+        Fraction(30),
+        words,
+        quality=_QUALITY,
+        tick=Fraction(1, _TICKS),
+        threads=1,
+        instead="--no-annotated",
+        extra="video",
+    ) as film:
+        for picture, time in chain([first], pictures):
+            last = max(last + 1, round((time - first[1]) * _TICKS))
+            film.add(picture[:height, :width], last)
