@@ -53,7 +53,7 @@ _ENUM = re.compile(r"\benum \{(.*?)\}", re.DOTALL)
 _STRUCT = re.compile(r"^typedef struct \{(.*?)^\} (\w+);", re.DOTALL | re.MULTILINE)
 _FIELDS = re.compile(r"(struct|union) \{(.*?)\}(.*?);|(\w+) (.*?);", re.DOTALL)
 _COLUMNS = ("State", "Seen", "Drive", "Weight", "Site", "Wire", "Station", "Wall", "Ring", "Tube", "Limits", "Memory")
-_COLUMNS += ("Motor", "Loaded", "Axial", "AxialState")
+_COLUMNS += ("Film", "Motor", "Loaded", "Axial", "AxialState")
 """Structs of numbers that Python packs or reads: the place of each field becomes a constant."""
 _NUMBERS = {"void": "None", "double": "float", "int64_t": "int", "bool": "bool"}
 _ARRAYS = {"float": "Float32", "int64_t": "Int64", "uint8_t": "UInt8", "Amplitude": "Complex128"}  # else of doubles

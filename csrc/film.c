@@ -15,27 +15,6 @@
 static const int ORDER[6] = {2, 4, 0, 1, 5, 3};
 enum { ODD = 3 }; /* motions of the order from here on change their sign with the mirror */
 
-Film film_opened(const double *packed) {
-    return (Film){
-        .tube = packed[0],
-        .body = packed[1],
-        .half = packed[2],
-        .rear = packed[3],
-        .rear_round = packed[4],
-        .front = packed[5],
-        .front_round = packed[6],
-        .first = packed[7],
-        .last = packed[8],
-        .intervals = (int64_t)packed[9],
-        .second_first = packed[10],
-        .second_last = packed[11],
-        .second_intervals = (int64_t)packed[12],
-        .yaw = packed[13],
-        .yaws = (int64_t)packed[14],
-        .coefficients = (const float *)(packed + FILM_HEAD),
-    };
-}
-
 /* A ring about the body's axis with a ball that runs around on it, or a spheroid (half > 0, ball 0); m. Of a ball larger
  * than the body, as under a slender nose, the ring's radius is negative: its centre is beyond the axis. */
 typedef struct {
@@ -100,14 +79,15 @@ static double gap_of(double tube, Part part, double e, Axis axis) {
     return tube - part.ball - copysign(hypot(q_y, q_z), tube - part.ball);
 }
 
-double film_smallest_gap(const Film *f, double e, double pitch, double yaw) {
+/* Smallest distance between a body and the wall, m. */
+EXPORT double smallest_gap(const Film *f /* (...) */, double e, double pitch, double yaw) {
     const Axis axis = axis_of(pitch, yaw);
     if (f->half > 0.0) return gap_of(f->tube, spheroid(f), e, axis);
     return smaller(gap_of(f->tube, rear_end(f), e, axis), gap_of(f->tube, front_end(f), e, axis));
 }
 
 /* Coordinate of a clearance: its logarithm where it is small against the radius, and finer about the radius. */
-static double stretched_clearance(double v, double radius) {
+EXPORT double stretched(double v, double radius) {
     const double wide = 1.0 + v / radius;
     return log(v * wide * wide);
 }
@@ -118,7 +98,7 @@ static double stretched_clearance(double v, double radius) {
  *
  *     int h^-1.5 ds = 2 L/(sqrt(rear front) (sqrt rear + sqrt front) (1 + (sin psi/scale)^2)).
  */
-static double yaw_scale_of(const Film *f, double rear, double front) {
+EXPORT double yaw_scale(const Film *f /* (...) */, double rear, double front) {
     if (f->half > 0.0) return 1.0;
     return sqrt(2.0 * (f->tube - f->body)) * (sqrt(rear) + sqrt(front)) / (f->front - f->rear);
 }
@@ -136,7 +116,7 @@ static Coordinates coordinates_of(const Film *f, double e, double pitch, double 
     double turn = sin(yaw);
     Coordinates c;
     if (f->half > 0.0) {
-        c.first = stretched_clearance(larger(clearance_of(f->tube, spheroid(f), e, axis), least), a);
+        c.first = stretched(larger(clearance_of(f->tube, spheroid(f), e, axis), least), a);
         c.second = pitch;
         c.yaw = asinh(turn) / asinh(largest);
         c.known = 0.0;
@@ -144,9 +124,9 @@ static Coordinates coordinates_of(const Film *f, double e, double pitch, double 
     } else {
         const double rear = larger(clearance_of(f->tube, rear_end(f), e, axis), least);
         const double front = larger(clearance_of(f->tube, front_end(f), e, axis), least);
-        const double scale = yaw_scale_of(f, rear, front), product = rear * front / (a * a * a);
-        c.first = stretched_clearance(rear, a);
-        c.second = stretched_clearance(front, a);
+        const double scale = yaw_scale(f, rear, front), product = rear * front / (a * a * a);
+        c.first = stretched(rear, a);
+        c.second = stretched(front, a);
         turn /= scale;
         c.yaw = asinh(turn) / asinh(largest / scale);
         c.known = -log(sqrt(product) * (sqrt(rear) + sqrt(front)) * (1.0 + turn * turn));
@@ -159,7 +139,7 @@ static Coordinates coordinates_of(const Film *f, double e, double pitch, double 
 }
 
 /* Weights of the four cubic B-splines at a place, and the number of their first; a straight line outside. */
-static int64_t spline_weights_at(double at, double first, double last, int64_t intervals, double out[4]) {
+EXPORT int64_t spline_weights(double at, double first, double last, int64_t intervals, double out[4]) {
     const double step = (last - first) / (double)intervals, place = (at - first) / step;
     const double inside = clamped(place, 0.0, (double)intervals);
     const int64_t cell = inside >= 1.0 ? (int64_t)smaller(inside, (double)(intervals - 1)) : 0; /* of no number too */
@@ -177,24 +157,32 @@ static int64_t spline_weights_at(double at, double first, double last, int64_t i
     return cell;
 }
 
+/* What the interpolation of a film goes by at a place. */
+EXPORT void film_coordinates(const Film *f /* (...) */, double e, double pitch, double yaw,
+                             Coordinates *out /* (5) */) {
+    *out = coordinates_of(f, e, pitch, yaw);
+}
+
 /* Fill log D and M, in the order of the triangle. */
 static void interpolate(const Film *f, const Coordinates *c, double out[FILM_ENTRIES]) {
     double along[4], across[4], sums[FILM_ENTRIES * FILM_MOST_YAWS];
-    const int64_t row = spline_weights_at(c->first, f->first, f->last, f->intervals, along);
-    const int64_t column = spline_weights_at(c->second, f->second_first, f->second_last, f->second_intervals, across);
-    const int64_t count = FILM_ENTRIES * f->yaws, columns = f->second_intervals + 3;
+    const int64_t row = spline_weights(c->first, f->first, f->last, (int64_t)f->intervals, along);
+    const int64_t column
+        = spline_weights(c->second, f->second_first, f->second_last, (int64_t)f->second_intervals, across);
+    const int64_t yaws = (int64_t)f->yaws, count = FILM_ENTRIES * yaws, columns = (int64_t)f->second_intervals + 3;
+    const float *coefficients = (const float *)(f + 1);
     for (int64_t k = 0; k < count; k++) sums[k] = 0.0;
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {
             const double weight = along[i] * across[j];
-            const float *of_cell = f->coefficients + ((row + i) * columns + column + j) * count;
+            const float *of_cell = coefficients + ((row + i) * columns + column + j) * count;
 #pragma omp simd
             for (int64_t k = 0; k < count; k++) sums[k] += weight * (double)of_cell[k];
         }
     }
     /* even polynomials in yaw, times the yaw for entries that change their sign with the mirror */
     const double even = c->yaw * c->yaw;
-    for (int64_t n = f->yaws - 2; n >= 0; n--)
+    for (int64_t n = yaws - 2; n >= 0; n--)
         for (int k = 0; k < FILM_ENTRIES; k++) sums[n * FILM_ENTRIES + k] += even * sums[(n + 1) * FILM_ENTRIES + k];
     for (int k = 0; k < FILM_ENTRIES; k++) out[k] = sums[k];
     for (int i = ODD; i < 6; i++)
@@ -245,55 +233,19 @@ void film_resistance(const Film *f, double e, double pitch, double yaw, double o
  * Outside of the table the film goes on: as power laws below its thinnest clearances, unchanged beyond its largest yaw.
  * Where the body touches the wall, the clearances are 1e-12 of its radius, and the gap is negative.
  *
- * packed: a film's table, packed; e: offset of the body's middle from the tube's axis, m, at least 0; pitch: pitch,
+ * e: offset of the body's middle from the tube's axis, m, at least 0; pitch: pitch,
  * rad, positive where the nose points away from the wall; yaw: yaw, rad; out: (6, 6), the result. */
-EXPORT double film_at(const double *packed /* (...) */, double e, double pitch, double yaw, double *out /* (6, 6) */) {
-    const Film film = film_opened(packed);
-    film_resistance(&film, e, pitch, yaw, (double (*)[6])out);
-    return film_smallest_gap(&film, e, pitch, yaw);
-}
-
-/* Smallest distance between a body and the wall, m; `head` may be a packed table. */
-EXPORT double smallest_gap(const double *head /* (...) */, double e, double pitch, double yaw) {
-    const Film film = film_opened(head);
-    return film_smallest_gap(&film, e, pitch, yaw);
+EXPORT double film_at(const Film *film /* (...) */, double e, double pitch, double yaw, double *out /* (6, 6) */) {
+    film_resistance(film, e, pitch, yaw, (double (*)[6])out);
+    return smallest_gap(film, e, pitch, yaw);
 }
 
 /* Depth by which a ring, or a spheroid, may sink until it touches the wall, m.
  *
- * head: head of a packed table; x: place on the body's axis; half: half-length of the spheroid, 0 for a ring; ring:
+ * x: place on the body's axis; half: half-length of the spheroid, 0 for a ring; ring:
  * radius of the ring or spheroid; rounded: radius of the ball that runs around on the ring; e: offset of the body's
  * middle; lift: component of the body's axis towards the tube's axis; side: component of the body's axis to the side. */
-EXPORT double clearance(const double *head /* (...) */, double x, double half, double ring, double rounded, double e,
+EXPORT double clearance(const Film *film /* (...) */, double x, double half, double ring, double rounded, double e,
                         double lift, double side) {
-    return clearance_of(head[0], (Part){x, half, ring, rounded}, e, (Axis){lift, side});
-}
-
-/* Coordinate of a clearance: its logarithm where it is small against the radius, and finer about the radius. */
-EXPORT double stretched(double v, double radius) { return stretched_clearance(v, radius); }
-
-/* Sine of the yaw at which the wall's curvature under the straight side counts, from the clearances of its ends. */
-EXPORT double yaw_scale(const double *head /* (...) */, double rear, double front) {
-    const Film film = film_opened(head);
-    return yaw_scale_of(&film, rear, front);
-}
-
-/* Write what the interpolation of a film goes by at a place; `head` may be a packed table.
- *
- * Three coordinates; the part of log D of the first motion that is known in closed form; and the angle from z' to the
- * normal of the wall, where a rounded end is nearest. */
-EXPORT void film_coordinates(const double *head /* (...) */, double e, double pitch, double yaw,
-                             double *out /* (5) */) {
-    const Film film = film_opened(head);
-    const Coordinates c = coordinates_of(&film, e, pitch, yaw);
-    out[0] = c.first;
-    out[1] = c.second;
-    out[2] = c.yaw;
-    out[3] = c.known;
-    out[4] = c.turn;
-}
-
-/* Weights of the four cubic B-splines at a place, and the number of their first; a straight line outside. */
-EXPORT int64_t spline_weights(double at, double first, double last, int64_t intervals, double *out /* (4) */) {
-    return spline_weights_at(at, first, last, intervals, out);
+    return clearance_of(film->tube, (Part){x, half, ring, rounded}, e, (Axis){lift, side});
 }

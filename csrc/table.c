@@ -55,17 +55,19 @@ Table table_opened(const double *packed) {
     t.yaw_limit = t.yaw_pitch_nodes + t.yaw_pitches;
     t.outer = t.yaw_limit + YAW_LIMIT;
     t.yawed = t.outer + t.gaps * (t.up + t.down - 1) * block;
-    t.film = film_opened(t.yawed + t.yaw_gaps * t.yaw_pitches * YAW_ORDERS * block);
+    t.film = (const Film *)(t.yawed + t.yaw_gaps * t.yaw_pitches * YAW_ORDERS * block);
     return t;
 }
 
-/* Offset e_c at which a body without yaw touches the floor of the tube, m: the hull of its rings. */
-static double contact_offset_at(const double (*outline)[4], int64_t rings, double radius, double pitch) {
+/* Offset e_c at which a body without yaw touches the floor of the tube, m.
+ *
+ * The body is the hull of rings about its axis, each the centre of an ellipse: (x, rho, semi-axis along, across), m. */
+EXPORT double contact_offset(const double (*rings)[4] /* (count, 4) */, double radius, double pitch, int64_t count) {
     const double c = cos(pitch), s = sin(pitch);
     double reach = -INFINITY;
-    for (int64_t i = 0; i < rings; i++) {
-        const double along = outline[i][2] * s, across = outline[i][3] * c;
-        reach = larger(reach, outline[i][1] * c - outline[i][0] * s + sqrt(along * along + across * across));
+    for (int64_t i = 0; i < count; i++) {
+        const double along = rings[i][2] * s, across = rings[i][3] * c;
+        reach = larger(reach, rings[i][1] * c - rings[i][0] * s + sqrt(along * along + across * across));
     }
     return radius - reach;
 }
@@ -120,7 +122,7 @@ typedef struct {
 static Position position_of(const Table *table, Pose pose) {
     Position p;
     const int lowered = pose.pitch < 0.0;
-    const double contact = contact_offset_at(table->outline, table->rings, table->radius, pose.pitch);
+    const double contact = contact_offset(table->outline, table->radius, pose.pitch, table->rings);
     p.t = clamped(1.0 - pose.offset / contact, 0.0, 1.0);
     gap_weights(table->gap_nodes, table->gaps, p.t, p.of_gap);
     double most = 0.0;
@@ -136,8 +138,9 @@ static Position position_of(const Table *table, Pose pose) {
     return p;
 }
 
-/* Largest yaw at a place, rad: x is the offset over R, `limit` the polynomial and the largest yaw anywhere. */
-static double largest_yaw_at(const double *limit, double x, double pitch) {
+/* Largest yaw at a place, rad: x is the offset of the body's mid-length over R, `limit` the polynomial and the largest yaw
+ * anywhere, of `yaw_limit_of`. */
+EXPORT double limited_yaw(const double *limit /* (7) */, double x, double pitch) {
     const double p = sin(pitch);
     const double sine = limit[0] + p * (limit[1] + p * limit[2]) + x * (limit[3] + p * limit[4] + x * limit[5]);
     return smaller(asin(sqrt(clamped(sine, LEAST_YAW * LEAST_YAW, 1.0))), limit[6]);
@@ -225,7 +228,7 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
     }
     int left = p->within ? INSIDE : TOO_FAR_PITCHED;
     if (pose.yaw != 0.0) {
-        const double most = largest_yaw_at(table->yaw_limit, pose.offset / table->radius, p->yawed_pitch);
+        const double most = limited_yaw(table->yaw_limit, pose.offset / table->radius, p->yawed_pitch);
         if (table->yaw_gaps > 0) add_yaw(table, p, pose.yaw / most, &terms);
         if (!(table->yaw_gaps > 0 && fabs(pose.yaw) <= YAW_SLACK * most)) left = TOO_FAR_YAWED;
     }
@@ -236,7 +239,7 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
 /* Set the share of the film's resistance. */
 static void set_film(const Table *table, Pose pose, double t, double film[6][6]) {
     const double share = cut_of_film(t);
-    film_resistance(&table->film, pose.offset, pose.pitch, pose.yaw, film);
+    film_resistance(table->film, pose.offset, pose.pitch, pose.yaw, film);
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < 6; j++) film[i][j] *= share;
 }
@@ -290,7 +293,7 @@ void table_slopes_at(const Table *table, const TablePlace *at, TableSlopes *out)
 }
 
 void table_place_near(const Table *table, const TablePlace *at, const TableSlopes *slopes, Pose pose, TablePlace *out) {
-    const double contact = contact_offset_at(table->outline, table->rings, table->radius, pose.pitch);
+    const double contact = contact_offset(table->outline, table->radius, pose.pitch, table->rings);
     const double *of_offset = slopes->of[0], *of_pitch = slopes->of[1], *of_yaw = slopes->of[2];
     const double e = pose.offset - at->pose.offset, p = pose.pitch - at->pose.pitch, psi = pose.yaw - at->pose.yaw;
     out->pose = pose;
@@ -322,8 +325,8 @@ int table_mean_resistance(const Table *table, Pose pose, int64_t phases, double 
 /* Offset e at which the smallest distance between body and wall is `gap`, m, by secants; NaN where none is. */
 static double offset_at_gap(const Film *film, double gap, double pitch, double yaw) {
     const double accuracy = 1e-12 * film->tube;
-    double e = film->tube - film->body - gap, spare = film_smallest_gap(film, e, pitch, yaw) - gap;
-    double before = e + spare, spare_before = film_smallest_gap(film, before, pitch, yaw) - gap;
+    double e = film->tube - film->body - gap, spare = smallest_gap(film, e, pitch, yaw) - gap;
+    double before = e + spare, spare_before = smallest_gap(film, before, pitch, yaw) - gap;
     for (int k = 0; k < 30; k++) {
         if (fabs(spare) <= accuracy) return e;
         double slope = e != before ? (spare - spare_before) / (e - before) : -1.0;
@@ -332,35 +335,21 @@ static double offset_at_gap(const Film *film, double gap, double pitch, double y
         before = e;
         spare_before = spare;
         e -= spare / slope;
-        spare = film_smallest_gap(film, e, pitch, yaw) - gap;
+        spare = smallest_gap(film, e, pitch, yaw) - gap;
     }
     return NAN;
-}
-
-/* Offset e_c at which a body without yaw touches the floor of the tube, m.
- *
- * The body is the hull of rings about its axis, each the centre of an ellipse: (x, rho, semi-axis along, across), m. */
-EXPORT double contact_offset(const double *rings /* (count, 4) */, double radius, double pitch, int64_t count) {
-    return contact_offset_at((const double (*)[4])rings, count, radius, pitch);
 }
 
 /* Offset at which the body of a packed table touches the floor of the tube without a yaw, m. */
 EXPORT double contact_offset_of(const double *packed /* (...) */, double pitch) {
     const Table table = table_opened(packed);
-    return contact_offset_at(table.outline, table.rings, table.radius, pitch);
-}
-
-/* Largest yaw at a place, rad.
- *
- * limit: of `yaw_limit_of`; x: offset of the body's mid-length over R; pitch: nose up, rad. */
-EXPORT double limited_yaw(const double *limit /* (7) */, double x, double pitch) {
-    return largest_yaw_at(limit, x, pitch);
+    return contact_offset(table.outline, table.radius, pitch, table.rings);
 }
 
 /* Largest yaw to either side at a place, rad: the table's nodes reach up to 0.95 of it. */
 EXPORT double largest_yaw(const double *packed /* (...) */, double e, double pitch) {
     const Table table = table_opened(packed);
-    return largest_yaw_at(table.yaw_limit, e / table.radius, pitch);
+    return limited_yaw(table.yaw_limit, e / table.radius, pitch);
 }
 
 /* Fill the Fourier coefficients of the outer part's factor at a place without yaw, (phases, 36). */
@@ -407,7 +396,7 @@ EXPORT void mean_resistances(const double *tables /* (rows, size) */, const int6
     for (int64_t n = 0; n < count; n++) {
         const Table table = table_opened(tables + which[n] * size);
         double (*matrix)[MOTIONS] = (double (*)[MOTIONS])(out + n * MOTIONS * MOTIONS);
-        const double e = offset_at_gap(&table.film, gap[n], pitch[n], yaw[n]);
+        const double e = offset_at_gap(table.film, gap[n], pitch[n], yaw[n]);
         int left = TOO_FAR_PITCHED;
         if (e >= 0.0) left = table_mean_resistance(&table, (Pose){e, pitch[n], yaw[n]}, phases, matrix);
         if (left != INSIDE)

@@ -20,7 +20,7 @@ typedef struct {
     const double *yaw_limit; /* of `limited_yaw` */
     const double *outer;     /* (gaps, up + down - 1, phases, FACTOR) */
     const double *yawed;     /* (yaw_gaps, yaw_pitches, YAW_ORDERS, phases, FACTOR) */
-    Film film;
+    const Film *film;
 } Table;
 
 /* Offset of the body's mid-length from the tube's axis, m; pitch nose up, away from the near wall, and yaw, rad. */

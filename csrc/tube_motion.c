@@ -240,7 +240,7 @@ static void touch(Touch *t) {
 
 /* Rates in balance; what is left of it. */
 static double balance(const Touch *t, const double film[6][6], double q[RATES], double left[RATES]) {
-    const FilmPlace place = {&t->robot->table.film, t->y, t->rotation, film, t->seen->film, t->robot->tube->viscosity};
+    const FilmPlace place = {t->robot->table.film, t->y, t->rotation, film, t->seen->film, t->robot->tube->viscosity};
     return balance_film(&place, t->sliced, t->balance, q, left);
 }
 

@@ -6,7 +6,10 @@ typedef struct {
     double rest[MOTIONS][MOTIONS], radius, body, sliding, axial, largest, stations[5][2];
 } StandIn;
 
-static Table stand_in_opened(const double *packed) { return (Table){.outline = (const double (*)[4])packed}; }
+static Table stand_in_opened(const double *packed) {
+    static const Film none = {0.0};
+    return (Table){.outline = (const double (*)[4])packed, .film = &none};
+}
 
 static void cross(const double a[3], const double b[3], double out[3]) {
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];

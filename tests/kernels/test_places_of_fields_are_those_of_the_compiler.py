@@ -29,13 +29,12 @@ def test_places_of_fields_are_those_of_the_compiler(tmp_path: Path) -> None:
     lines = ["#include <stddef.h>", *(f'#include "{name}"' for name in HEADERS)]
     checked = 0
     for struct in BUILD["_COLUMNS"]:
-        prefix = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", struct).upper() + "_"
-        for name, value in constants.items():
-            if not name.startswith(prefix) or (prefix == "AXIAL_" and name.startswith("AXIAL_STATE_")):
-                continue
-            field = name.removeprefix(prefix).lower()
-            place = f"sizeof({struct})" if field == "size" else f"offsetof({struct}, {path_of(struct, field)})"
-            lines.append(f'_Static_assert({place} == {value} * sizeof(double), "{name}");')
+        places = dict(constants)
+        size = BUILD["_add_places"](places, "", STRUCTS, STRUCTS[struct], 0)
+        own = {name[1:].lower(): place for name, place in places.items() if name.startswith("_")}
+        offsets = [(f"offsetof({struct}, {path_of(struct, field)})", place) for field, place in own.items()]
+        for found, place in [(f"sizeof({struct})", size), *offsets]:
+            lines.append(f'_Static_assert({found} == {place} * sizeof(double), "");')
             checked += 1
     assert checked > 150
     source = tmp_path / "places.c"

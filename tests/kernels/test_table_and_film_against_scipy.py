@@ -25,7 +25,7 @@ def film_of(film: np.ndarray, e: float, pitch: float, yaw: float) -> np.ndarray:
     c = np.empty(5)
     core.film_coordinates(film, e, pitch, yaw, c)
     shape = tube_table.shape_of(film)
-    values = film[tube_table.HEAD :].view(np.float32)[: np.prod(shape)].astype(float).reshape(shape)
+    values = film[core.FILM_SIZE :].view(np.float32)[: np.prod(shape)].astype(float).reshape(shape)
     for at, (low, high, intervals) in zip(c[:2], (film[7:10], film[10:13]), strict=True):
         knots = low + (high - low) / intervals * np.arange(-3.0, intervals + 4.0)
         values = BSpline(knots, values, 3)(at)
@@ -36,9 +36,9 @@ def film_of(film: np.ndarray, e: float, pitch: float, yaw: float) -> np.ndarray:
             lower[i, j] = next(entries) * (c[2] if i >= 3 > j else 1.0)
     d = np.exp(even[:6] + np.array([c[3], 0, 0, 0, 0, 0]))
     order = np.array(tube_table.ORDER)
-    size = np.where(order < 3, 1.0, film[tube_table.BODY])
+    size = np.where(order < 3, 1.0, film[core.FILM_BODY])
     found = np.empty((6, 6))
-    found[np.ix_(order, order)] = film[tube_table.BODY] * np.outer(size, size) * (lower * d @ lower.T)
+    found[np.ix_(order, order)] = film[core.FILM_BODY] * np.outer(size, size) * (lower * d @ lower.T)
     turn, cos, sin = np.eye(6), np.cos(c[4]), np.sin(c[4])
     turn[np.ix_([0, 2], [0, 2])] = [[cos, sin], [-sin, cos]]
     return turn @ found @ turn.T

@@ -12,24 +12,21 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.core import MOTIONS, contact_offset_of, largest_yaw, stretched_yaw
-
-# Columns of the head of a packed table.
-TUBE, BODY, HALF = 0, 1, 2  # R, a and a spheroid's half-length (0: a straight side), m
-REAR, REAR_ROUND, FRONT, FRONT_ROUND = (
-    3,
-    4,
-    5,
-    6,
-)  # ends of the straight side, x (a spheroid's middle), and the radii of the ends, m
-FIRST, LAST, INTERVALS = 7, 8, 9  # of the first coordinate's knots
-SECOND_FIRST, SECOND_LAST, SECOND_INTERVALS = 10, 11, 12  # of the second's
-YAW, YAWS = 13, 14  # largest yaw, rad; polynomials in yaw
-HEAD = 15
+from spirillum.kernels.core import (
+    FILM_BODY,
+    FILM_ENTRIES,
+    FILM_INTERVALS,
+    FILM_SECOND_INTERVALS,
+    FILM_SIZE,
+    FILM_YAWS,
+    MOTIONS,
+    contact_offset_of,
+    largest_yaw,
+    stretched_yaw,
+)
 
 ORDER = (2, 4, 0, 1, 5, 3)
 """Order of the motions (U, Omega) in the factors: those that the film resists most come first, even ones before odd."""
-ENTRIES = 21
 _MOST_INTERVALS = 99  # intervals of a coordinate, and polynomials
 
 
@@ -40,7 +37,7 @@ def has_head(table: Samples, size: int, radius: float) -> bool:
 
 def shape_of(film: Samples) -> tuple[int, int, int, int]:
     """Shape of the coefficients of a film from its head, or from all of it: both coordinates, yaws, entries."""
-    return int(film[INTERVALS]) + 3, int(film[SECOND_INTERVALS]) + 3, int(film[YAWS]), ENTRIES
+    return int(film[FILM_INTERVALS]) + 3, int(film[FILM_SECOND_INTERVALS]) + 3, int(film[FILM_YAWS]), FILM_ENTRIES
 
 
 def film_is_whole(film: Samples, radius: float) -> bool:
@@ -50,12 +47,12 @@ def film_is_whole(film: Samples, radius: float) -> bool:
         film: of any numbers.
         radius: R of the tube, m.
     """
-    if not has_head(film, HEAD, radius):
+    if not has_head(film, FILM_SIZE, radius):
         return False
-    counts = film[[INTERVALS, SECOND_INTERVALS, YAWS]]
-    if np.any(counts % 1.0) or counts.min() < 1 or counts.max() > _MOST_INTERVALS or not 0.0 < film[BODY] < radius:
+    counts = film[[FILM_INTERVALS, FILM_SECOND_INTERVALS, FILM_YAWS]]
+    if np.any(counts % 1.0) or counts.min() < 1 or counts.max() > _MOST_INTERVALS or not 0.0 < film[FILM_BODY] < radius:
         return False
-    values = film[HEAD:].view(np.float32)  # one more where their number is odd
+    values = film[FILM_SIZE:].view(np.float32)  # one more where their number is odd
     return values.size - math.prod(shape_of(film)) in (0, 1) and bool(np.isfinite(values).all())
 
 

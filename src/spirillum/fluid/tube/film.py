@@ -234,11 +234,11 @@ class FilmTable:
         """Tabulate the lubrication film of a body up to a yaw and a pitch, rad, in half a minute of one core."""
         body = FilmBody.of(outline)
         head = _head(body, radius, yaw, pitch, intervals)
-        head[table.YAWS] = yaws
+        head[core.FILM_YAWS] = yaws
         places = np.concatenate([[0.0, 1 / 3], np.arange(1, intervals), [intervals - 1 / 3, intervals]])
         grids = [low + (high - low) * places / intervals for low, high in (head[7:9], head[10:12])]
         etas = _yaw_nodes(yaws)
-        nodes = np.empty((places.size, places.size, yaws, table.ENTRIES))
+        nodes = np.empty((places.size, places.size, yaws, core.FILM_ENTRIES))
         for i, first in enumerate(grids[0]):
             for j, second in enumerate(grids[1]):
                 for k, eta in enumerate(etas):
@@ -282,15 +282,15 @@ def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: in
         raise InputError(
             f"lubrication films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius"
         )
-    head = np.zeros(table.HEAD)
+    head = np.zeros(core.FILM_SIZE)
     head[:7] = radius, a, body.half, *body.rear, *body.front
     widest = min(2.0 * (radius - a), radius - a + np.sin(pitch) * reach)
-    head[table.FIRST] = core.stretched(_THINNEST * a, a)
-    head[table.LAST] = core.stretched(widest, a)
-    head[table.INTERVALS] = head[table.SECOND_INTERVALS] = intervals
+    head[core.FILM_FIRST] = core.stretched(_THINNEST * a, a)
+    head[core.FILM_LAST] = core.stretched(widest, a)
+    head[core.FILM_INTERVALS] = head[core.FILM_SECOND_INTERVALS] = intervals
     head[10:12] = (-_SPHEROID_PITCH, _SPHEROID_PITCH) if body.half else head[7:9]
     room = 1.0 if reach == 0 else min(0.6 * (radius - a) / reach, 1.0)
-    head[table.YAW] = min(yaw, float(np.arcsin(room)))
+    head[core.FILM_YAW] = min(yaw, float(np.arcsin(room)))
     return head
 
 
@@ -309,7 +309,7 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
     """Offset, pitch and yaw of coordinates in a table; pitches are cut off at `_STEEPEST`."""
     tube, a, half, rear, _, front, _ = head[:7]
     if half:
-        psi = float(np.arcsin(np.sinh(eta * np.arcsinh(np.sin(head[table.YAW])))))
+        psi = float(np.arcsin(np.sinh(eta * np.arcsinh(np.sin(head[core.FILM_YAW])))))
         e, wanted = 0.0, _clearance_of(first, a)
         for _ in range(4):
             e += core.clearance(head, rear, half, a, 0.0, e, np.sin(second), np.cos(second) * np.sin(psi)) - wanted
@@ -317,7 +317,7 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
     length = front - rear
     v = np.array([_clearance_of(first, a), _clearance_of(second, a)])
     scale = core.yaw_scale(head, *v)
-    sine = scale * np.sinh(eta * np.arcsinh(np.sin(head[table.YAW]) / scale))
+    sine = scale * np.sinh(eta * np.arcsinh(np.sin(head[core.FILM_YAW]) / scale))
     v = np.minimum(v, v.min() + _STEEPEST * length)
 
     lift = (v[1] - v[0]) / length

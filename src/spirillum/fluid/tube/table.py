@@ -35,7 +35,7 @@ from spirillum.kernels import core, tube_table
 from spirillum.robot.tail_form import PLAIN
 
 _REST = 3e-6
-_FILM = np.where(np.arange(tube_table.ENTRIES) < len(tube_table.ORDER), 2e-5, 1e-6)
+_FILM = np.where(np.arange(core.FILM_ENTRIES) < len(tube_table.ORDER), 2e-5, 1e-6)
 """Quantum of the stored numbers."""
 _MOST_STEPS = 2.0**31 - 1.0
 """Bound of film coefficients: larger ones belong to angles at which no robot fits into its tube."""
@@ -105,7 +105,7 @@ class _Reader:
         nodes, rows = self._exact(int(counts[0])), self._exact(int(counts[1]))
         shapes = tube_table.shapes_of(nodes)
         rest, yawed = (self._whole(shape) * _steps(rows) for shape in shapes)
-        head = self._exact(tube_table.HEAD)
+        head = self._exact(core.FILM_SIZE)
         yawed = _times(np.asarray(np.linalg.inv(tube_table.yaw_parts_at_nodes()), dtype=np.float64), yawed)
         film = (self._whole(tube_table.shape_of(head)) * _FILM).astype(np.float32).ravel()
         packed = np.concatenate([head, np.pad(film, (0, film.size % 2)).view(np.float64)])
@@ -165,8 +165,8 @@ def _steps(rows: Samples) -> Samples:
 
 def _film_of(film: Samples) -> tuple[Samples, Samples]:
     """Unpack head and coefficients of a lubrication film."""
-    head, shape = film[: tube_table.HEAD], tube_table.shape_of(film)
-    values = film[tube_table.HEAD :].copy().view(np.float32)[: int(np.prod(shape))]
+    head, shape = film[: core.FILM_SIZE], tube_table.shape_of(film)
+    values = film[core.FILM_SIZE :].copy().view(np.float32)[: int(np.prod(shape))]
     return head, values.reshape(shape).astype(np.float64)
 
 
