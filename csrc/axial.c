@@ -147,33 +147,33 @@ static void close_step(const Block *b, int64_t k, const Axial *p, AxialState *st
 
 /* Take robots over a time, each at its own duty and flow.
  *
- * states: changed in place, NaN where duty, flow or parameters are none;
+ * states: changed in place, NaN where duty, flow or robots have none;
  * dt: s, positive; duty: 0 to 1; flow: imposed mean flow, m/s; fineness: number of pieces, relative to the normal one. */
-EXPORT void advance_axial(const double *parameters /* (count, 18) */, double *states /* (count, 7) */, double dt,
+EXPORT void advance_axial(const Axial *robots /* (count) */, AxialState *states /* (count) */, double dt,
                           const double *duty /* (count) */, const double *flow /* (count) */, double fineness,
                           int64_t count) {
     Block block;
     for (int64_t low = 0; low < count; low += BLOCK) {
         const int64_t width = count - low < BLOCK ? count - low : BLOCK;
-        const Axial *robots = (const Axial *)parameters + low;
-        AxialState *own = (AxialState *)states + low;
-        const double fastest = open_block(&block, robots, own, duty + low, flow + low, width);
+        const Axial *own = robots + low;
+        AxialState *state = states + low;
+        const double fastest = open_block(&block, own, state, duty + low, flow + low, width);
         const double rest = integrate_block(&block, width, dt, fastest, fineness);
         for (int64_t k = 0; k < width; k++)
-            close_step(&block, k, robots + k, own + k, duty[low + k], flow[low + k] * dt, rest);
+            close_step(&block, k, own + k, state + k, duty[low + k], flow[low + k] * dt, rest);
     }
 }
 
 /* The same of robots whose motor has a curve, see `curve_torques`: its torque, N m, stands in place of the current, with a
  * torque constant of 1. It is constant over a step. */
-EXPORT void advance_on_curve(const double *parameters /* (count, 18) */, double *states /* (count, 7) */, double dt,
-                             const double *duty /* (count) */, const double *flow /* (count) */,
-                             const double *curve /* (25) */, int64_t count) {
+EXPORT void advance_on_curve(const Axial *robots /* (count) */, AxialState *states /* (count) */, double dt,
+                             const double *duty /* (count) */, const double *flow /* (count) */, const Curve *curve,
+                             int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        const Axial *p = (const Axial *)parameters + n;
-        AxialState *state = (AxialState *)states + n;
+        const Axial *p = robots + n;
+        AxialState *state = states + n;
         const double sense = p->motor.polarity, coasting = sense * (p->tail_flow - p->body_flow) * flow[n];
-        const double torque = sense * curve_torque((const Curve *)curve, duty[n], coasting, p->tail - p->body);
+        const double torque = sense * curve_torque(curve, duty[n], coasting, p->tail - p->body);
         state->current = torque;
         state->position += (p->speed * torque + p->speed_flow * flow[n]) * dt;
         state->tail_angle += (p->tail * torque + p->tail_flow * flow[n]) * dt;
@@ -183,15 +183,14 @@ EXPORT void advance_on_curve(const double *parameters /* (count, 18) */, double 
 }
 
 /* Derivative of the state of one robot at a current, A, a duty and an imposed mean flow, m/s. */
-EXPORT void axial_rates(const double *parameters /* (18) */, double current, double duty, double flow,
-                        double *out /* (7) */) {
-    const Axial *p = (const Axial *)parameters;
-    const Motor *m = &p->motor;
+EXPORT void axial_rates(const Axial *robot, double current, double duty, double flow, AxialState *out) {
+    const Motor *m = &robot->motor;
     const double torque = m->torque_constant * current, square = current * current;
-    const double tail = p->tail * torque + p->tail_flow * flow, body = p->body * torque + p->body_flow * flow;
-    *(AxialState *)out = (AxialState){
+    const double tail = robot->tail * torque + robot->tail_flow * flow,
+                 body = robot->body * torque + robot->body_flow * flow;
+    *out = (AxialState){
         .current = m->polarity * current_rate(m, duty, m->polarity * current, m->polarity * (tail - body)),
-        .position = p->speed * torque + p->speed_flow * flow,
+        .position = robot->speed * torque + robot->speed_flow * flow,
         .tail_angle = tail,
         .body_angle = body,
         .charge = m->polarity * duty * current,

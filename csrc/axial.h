@@ -16,9 +16,9 @@ typedef struct {
     double squared_current, heat; /* integrals of I^2, A^2 s, and of R I^2, J */
 } AxialState;
 
-EXPORT void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
+EXPORT void advance_axial(const Axial *robots, AxialState *states, double dt, const double *duty, const double *flow,
                           double fineness, int64_t count);
-EXPORT void advance_on_curve(const double *parameters, double *states, double dt, const double *duty,
-                             const double *flow, const double *curve, int64_t count);
+EXPORT void advance_on_curve(const Axial *robots, AxialState *states, double dt, const double *duty, const double *flow,
+                             const Curve *curve, int64_t count);
 
 #endif

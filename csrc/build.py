@@ -115,16 +115,25 @@ def stubs() -> str:
         "from __future__ import annotations\n",
         "from spirillum.kernels.native import Array, Complex128, Float32, Float64, Int64, UInt8, native\n",
     ]
-    found += [f"{name} = {value}" for name, value in _constants().items()]
+    headers = _structs("".join(path.read_text(encoding="utf-8") for path in sorted(SOURCES.glob("*.h"))))
+    constants = _constants(headers)
+    found += [f"{name} = {value}" for name, value in constants.items()]
     for path in sorted(SOURCES.glob("*.c")):
-        found += [_stub(exported, path.name) for exported in _EXPORTED.finditer(path.read_text(encoding="utf-8"))]
+        text = path.read_text(encoding="utf-8")
+        structs = headers | _structs(text)
+        found += [_stub(exported, structs, constants, path.name) for exported in _EXPORTED.finditer(text)]
     return "\n".join(found)
 
 
-def _constants() -> dict[str, int]:
+def _structs(text: str) -> dict[str, str]:
+    """Return the fields of structs of numbers, by name; complex numbers are none."""
+    found = {name: fields for fields, name in _STRUCT.findall(_COMMENT.sub("", text))}
+    return {name: fields for name, fields in found.items() if name not in _ARRAYS}
+
+
+def _constants(structs: dict[str, str]) -> dict[str, int]:
     """Return the enumerators of headers, and the places of fields in structs and the sizes of these: STATE_PHASE."""
     text = _COMMENT.sub("", "".join(path.read_text(encoding="utf-8") for path in sorted(SOURCES.glob("*.h"))))
-    structs = {name: body for body, name in _STRUCT.findall(text)}
     found: dict[str, int] = {}
     for listed in _ENUM.findall(text):
         for number, one in enumerate(listed.split(",")):
@@ -158,7 +167,7 @@ def _add_places(
     return end
 
 
-def _stub(exported: re.Match[str], source: str) -> str:
+def _stub(exported: re.Match[str], structs: dict[str, str], constants: dict[str, int], source: str) -> str:
     doc = re.sub(r"\n \*", "\n", exported["doc"]).replace("\n ", "\n    ").strip()
     rows = re.search(r"\n *Threads share (\w+)\.", doc)
     options, arguments, lengths = [f'rows="{rows[1]}"'] if rows else [], [], set[str]()
@@ -170,6 +179,8 @@ def _stub(exported: re.Match[str], source: str) -> str:
             arguments.append(f"{name}: {_NUMBERS[kind]}")
             continue
         sizes = shape.split(", ") if shape else re.findall(r"\d+", declared)
+        if kind in structs and sizes != ["..."]:
+            sizes.append(str(_add_places(dict(constants), "", structs, structs[kind], 0)))
         lengths |= set(sizes)
         arguments.append(f'{name}: {_ARRAYS.get(kind, "Float64")}[Array, "{" ".join(sizes)}"]')
         if f"const {kind} {declared}" not in exported["arguments"]:

@@ -289,40 +289,33 @@ static double told(Nearest at, double *normal, double *point, double *j) {
  * y: the state; rotation: body axes to lab; radius: R of the tube; site: row of sites; normal: wall's
  * normal at the nearest point in body axes; point: touching point from the origin in body axes, m; j:
  * (7,): the gap closes at j.q at the rates q. */
-EXPORT double ring_gap(const double *y /* (19) */, const double *rotation /* (3, 3) */, double radius,
-                       const double *site /* (5) */, double *normal /* (3) */, double *point /* (3) */,
-                       double *j /* (7) */) {
-    const double (*axes)[3] = (const double (*)[3])rotation;
-    return told(site_nearest((const Site *)site, (const State *)y, axes, radius), normal, point, j);
+EXPORT double ring_gap(const State *y, const double (*rotation)[3] /* (3, 3) */, double radius, const Site *site,
+                       double *normal /* (3) */, double *point /* (3) */, double *j /* (7) */) {
+    return told(site_nearest(site, y, rotation, radius), normal, point, j);
 }
 
 /* Return the gap between the wall and the wire where it is farthest from the tube's axis, m.
  *
  * Arguments as of `ring_gap`; `bracket` is where along the wire to look: from, first guess, to; m from the root;
  * `stations` are those that it spans, two or three. */
-EXPORT double crest(const double *y /* (19) */, const double *rotation /* (3, 3) */, double radius,
-                    const double *wire /* (6) */, const double *stations /* (count, 8) */,
-                    const double *bracket /* (3) */, double *normal /* (3) */, double *point /* (3) */,
-                    double *j /* (7) */, int64_t count) {
+EXPORT double crest(const State *y, const double (*rotation)[3] /* (3, 3) */, double radius, const Wire *wire,
+                    const Station *stations /* (count) */, const double *bracket /* (3) */, double *normal /* (3) */,
+                    double *point /* (3) */, double *j /* (7) */, int64_t count) {
     (void)count;
-    const double (*axes)[3] = (const double (*)[3])rotation;
-    const Station *about = (const Station *)stations;
-    return told(wire_nearest((const Wire *)wire, about, (const State *)y, axes, radius, bracket), normal, point, j);
+    return told(wire_nearest(wire, stations, y, rotation, radius, bracket), normal, point, j);
 }
 
 /* Return the gap as `crest` does, and write the forces of the lubrication film there.
  *
  * y: state, as of `ring_gap`; wire: columns of the wire; stations: all those of one wire; bracket: as of `crest`;
  * viscosity: Pa s; bound: p_c, Pa; rates: q; force: result against the rates, N and N m. */
-EXPORT double crest_film(const double *y /* (19) */, const double *rotation /* (3, 3) */, double radius,
-                         const double *wire /* (6) */, const double *stations /* (count, 8) */,
-                         const double *bracket /* (3) */, double viscosity, double bound, const double *rates /* (7) */,
-                         double *force /* (7) */, int64_t count) {
-    const double (*axes)[3] = (const double (*)[3])rotation;
-    const Station *first = (const Station *)stations, *last = first + count - 1, *at = first;
+EXPORT double crest_film(const State *y, const double (*rotation)[3] /* (3, 3) */, double radius, const Wire *wire,
+                         const Station *stations /* (count) */, const double *bracket /* (3) */, double viscosity,
+                         double bound, const double *rates /* (7) */, double *force /* (7) */, int64_t count) {
+    const Station *last = stations + count - 1, *at = stations;
     while (at + 1 < last && at[1].xi <= bracket[0]) at++;
-    const Crest crest = {(const Wire *)wire, at, first, last, (const State *)y, axes, radius, viscosity, bound};
-    const Nearest nearest = wire_nearest(crest.wire, at, crest.y, axes, radius, bracket);
+    const Crest crest = {wire, at, stations, last, y, rotation, radius, viscosity, bound};
+    const Nearest nearest = wire_nearest(wire, at, y, rotation, radius, bracket);
     double matrix[RATES][RATES] = {{0.0}};
     Slices slices;
     clear_slices(&slices);

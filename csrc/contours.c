@@ -52,7 +52,7 @@ EXPORT void edge_points(const double pose[3], const double *factors /* (8, 5, 4,
  * along them; slopes: Jacobian of the displacement along each normal by (x, y, heading), pixels per m and per rad. */
 EXPORT void edge_places(const double pose[3], const double *factors /* (8, 5, 4, count) */,
                         const double (*normals)[2] /* (count, 2) */, const double reach[2], double axis_height,
-                        const Camera *camera /* (17) */, double (*pixels)[2] /* (count, 2) */,
+                        const Camera *camera, double (*pixels)[2] /* (count, 2) */,
                         double (*directions)[2] /* (count, 2) */, double *size /* (count) */,
                         double (*slopes)[3] /* (count, 3) */, int64_t count) {
     const double c = cos(pose[2]), s = sin(pose[2]), step = 1e-4; /* m */

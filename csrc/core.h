@@ -1,10 +1,11 @@
 /* What all files of csrc/ share.
  *
- * A function that Python calls is EXPORTed. build.py writes its stub, spirillum/kernels/core.py, from its declaration and
- * from the comment before it. Arrays are pointers to their first element (C order) with their shape in a comment, (...)
- * for any; written are those that are not const. The dimensions that shapes name come last, each once, in the order in
- * which they first appear, and are no arguments of the stub. `Threads share n.` lets threads work on ranges of n. A
- * function allocates nothing unless it says so, keeps nothing between calls, and checks nothing: the Python layer has.
+ * A function that Python calls is EXPORTed. build.py writes its stub, spirillum/kernels/core.py, from its declaration
+ * and from the comment before it. Arrays are pointers to their first element (C order) with their shape in a comment,
+ * (...) for any; those of structs end with the numbers of a struct; written are those that are not const. The
+ * dimensions that shapes name come last, each once, in the order in which they first appear, and are no arguments of
+ * the stub. `Threads share n.` lets threads work on ranges of n. A function allocates nothing unless it says so, keeps
+ * nothing between calls, and checks nothing: the Python layer has.
  */
 #ifndef SPIRILLUM_CORE_H
 #define SPIRILLUM_CORE_H

@@ -71,9 +71,9 @@ static double root_of(const Search *s) {
 
 /* Steady root of (17), A: R(I) I = d V(I) - (back-emf + back-emf per current I). Negative where the load drives the motor,
  * NaN where it does so beyond any root or beyond what the battery's voltage allows. */
-EXPORT void steady_currents(const double *cases /* (count, 15) */, double *out /* (count) */, int64_t count) {
+EXPORT void steady_currents(const Loaded *cases /* (count) */, double *out /* (count) */, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        const Loaded *at = (const Loaded *)cases + n;
+        const Loaded *at = cases + n;
         const double left = at->duty * at->motor.voltage - at->back_emf, sense = left < 0.0 ? -1.0 : 1.0;
         const Search search
             = {&at->motor, at->back_emf_per_current + sense * at->duty * at->motor.internal_resistance, fabs(left)};
@@ -83,10 +83,10 @@ EXPORT void steady_currents(const double *cases /* (count, 15) */, double *out /
 }
 
 /* Fill R(|I|), ohm, and dR/d|I|, ohm/A, of motors at currents, A. */
-EXPORT void windings(const double *motors /* (count, 12) */, const double *currents /* (count) */,
+EXPORT void windings(const Motor *motors /* (count) */, const double *currents /* (count) */,
                      double *out /* (count, 2) */, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        const Winding found = winding_at((const Motor *)motors + n, currents[n]);
+        const Winding found = winding_at(motors + n, currents[n]);
         out[2 * n] = found.resistance;
         out[2 * n + 1] = found.slope;
     }
@@ -124,8 +124,8 @@ double curve_torque(const Curve *curve, double duty, double coasting, double per
  *
  * curve: number of points, then rate, rad/s, and torque, N m, of each; of 25 numbers; coasting: rate of the joint
  * without a torque, rad/s; per_torque: what a torque adds to it, 1/(N m s); duty: 0 to 1; scales the torques. */
-EXPORT void curve_torques(const double *curve /* (25) */, const double *coasting /* (count) */,
+EXPORT void curve_torques(const Curve *curve, const double *coasting /* (count) */,
                           const double *per_torque /* (count) */, double duty, double *out /* (count) */,
                           int64_t count) {
-    for (int64_t n = 0; n < count; n++) out[n] = curve_torque((const Curve *)curve, duty, coasting[n], per_torque[n]);
+    for (int64_t n = 0; n < count; n++) out[n] = curve_torque(curve, duty, coasting[n], per_torque[n]);
 }

@@ -158,8 +158,7 @@ EXPORT int64_t spline_weights(double at, double first, double last, int64_t inte
 }
 
 /* What the interpolation of a film goes by at a place. */
-EXPORT void film_coordinates(const Film *f /* (...) */, double e, double pitch, double yaw,
-                             Coordinates *out /* (5) */) {
+EXPORT void film_coordinates(const Film *f /* (...) */, double e, double pitch, double yaw, Coordinates *out) {
     *out = coordinates_of(f, e, pitch, yaw);
 }
 

@@ -35,8 +35,7 @@ void weight_loads(const Weight *weight, double phase, const double rotation[3][3
  *
  * About x it is b = B (0, -sin a, cos a), a = rate t + phase, up at a = 0. The least rotation that takes x to n takes
  * it to b - n.b (x + n)/(1 + n_x). */
-EXPORT void field_at(double time, const double *packed /* (48) */, double *out /* (3) */) {
-    const Drive *drive = (const Drive *)packed;
+EXPORT void field_at(double time, const Drive *drive, double *out /* (3) */) {
     const double angle = drive->field_rate * time + drive->field_phase;
     const double along = -drive->field * sin(angle), up = drive->field * cos(angle);
     const double n_y = drive->axis_y, n_z = drive->axis_z, n_x = sqrt(1.0 - n_y * n_y - n_z * n_z);
@@ -51,7 +50,7 @@ void field_loads(const Drive *drive, double time, const double rotation[3][3], d
     for (int i = 0; i < RATES; i++) force[i] = 0.0;
     if (drive->kind != MAGNETIC || !(drive->duty > 0.0)) return;
     double field[3], b[3];
-    field_at(time, (const double *)drive, field);
+    field_at(time, drive, field);
     for (int i = 0; i < 3; i++)
         b[i] = rotation[0][i] * field[0] + rotation[1][i] * field[1] + rotation[2][i] * field[2];
     const double *m = drive->moment;

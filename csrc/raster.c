@@ -12,8 +12,6 @@ typedef struct {
     double ambient, diffuse, specular, exponent;
 } Material;
 
-_Static_assert(sizeof(Material) == 4 * sizeof(double), "the layout of a packed material");
-
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /* Light that corners of triangles send to a camera far above them (Blinn-Phong).
@@ -24,7 +22,7 @@ static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a
  * light of each corner; specular: specular light of each corner. */
 EXPORT void shade(const double (*normals)[3] /* (triangles, 3, 3) */, const double turn[3][3],
                   const double (*towards)[3] /* (lamps, 3) */, const double (*halfway)[3] /* (lamps, 3) */,
-                  const double *strength /* (lamps) */, const Material *materials /* (kinds, 4) */,
+                  const double *strength /* (lamps) */, const Material *materials /* (kinds) */,
                   const int64_t *kind /* (triangles) */, double *diffuse /* (triangles, 3) */,
                   double *specular /* (triangles, 3) */, int64_t triangles, int64_t lamps, int64_t kinds) {
     (void)kinds;
@@ -179,8 +177,6 @@ typedef struct {
     double softness, darkness;   /* width of its edge; relative loss of light */
 } Shadow;
 
-_Static_assert(sizeof(Shadow) == 8 * sizeof(double), "the layout of a packed shadow");
-
 /* Share of the light that reaches a place on the floor. */
 static double lit(const Shadow *s, double x, double y) {
     const double along = fabs(x * s->axis_x + y * s->axis_y), across = y * s->axis_x - x * s->axis_y;
@@ -199,7 +195,7 @@ static double lit(const Shadow *s, double x, double y) {
 EXPORT void blend(float *depth /* (rows, columns, 16) */, const float (*samples)[3] /* (rows, columns, 16, 3) */,
                   int64_t left, int64_t top, const float *over /* (whole_rows, whole_columns) */,
                   const float *shine /* (whole_rows, whole_columns) */,
-                  const float (*floors)[2] /* (whole_rows, whole_columns, 2) */, const Shadow *shadow /* (8) */,
+                  const float (*floors)[2] /* (whole_rows, whole_columns, 2) */, const Shadow *shadow,
                   const double tint[3], float (*picture)[3] /* (whole_rows, whole_columns, 3) */, int64_t rows,
                   int64_t columns, int64_t whole_rows, int64_t whole_columns) {
     (void)whole_rows;

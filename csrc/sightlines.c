@@ -12,14 +12,10 @@ typedef struct {
     double turn[3][3];                /* rotation from the frame to the tilted camera */
 } VirtualCamera;
 
-_Static_assert(sizeof(VirtualCamera) == 17 * sizeof(double), "the layout of a packed virtual camera");
-
 /* A line of sight below the surface: where it crosses it, m, and the unit vector in the oil, away from the camera. */
 typedef struct {
     double x, y, dx, dy, dz;
 } Ray;
-
-_Static_assert(sizeof(Ray) == 5 * sizeof(double), "the layout of a packed line of sight");
 
 /* Horizontal distance from the lens at which the ray to a point crosses the surface.
  *
@@ -38,7 +34,7 @@ static double crossing_of(const VirtualCamera *c, double across, double deep) {
 }
 
 /* Pixel u, v and height z of points, by Snell's law; those above the surface are seen straight. */
-EXPORT void project(const double (*points)[3] /* (count, 3) */, const VirtualCamera *c /* (17) */,
+EXPORT void project(const double (*points)[3] /* (count, 3) */, const VirtualCamera *c,
                     double (*seen)[3] /* (count, 3) */, int64_t count) {
     for (int64_t i = 0; i < count; i++) {
         double x = points[i][0], y = points[i][1], down = c->eye - points[i][2];
@@ -94,8 +90,8 @@ static Ray sightline(const VirtualCamera *c, double u, double v) {
 }
 
 /* Lines of sight of pixels: x and y where they cross the surface, unit vector in the oil, away from the camera. */
-EXPORT void sightlines(const double (*pixels)[2] /* (count, 2) */, const VirtualCamera *camera /* (17) */,
-                       Ray *rays /* (count, 5) */, int64_t count) {
+EXPORT void sightlines(const double (*pixels)[2] /* (count, 2) */, const VirtualCamera *camera, Ray *rays /* (count) */,
+                       int64_t count) {
     for (int64_t i = 0; i < count; i++) rays[i] = sightline(camera, pixels[i][0], pixels[i][1]);
 }
 
@@ -105,8 +101,6 @@ typedef struct {
     double spacing, width; /* from one line to the next; of a line */
 } Ruler;
 
-_Static_assert(sizeof(Ruler) == 6 * sizeof(double), "the layout of a packed ruler");
-
 /* A glass tube along x; m. */
 typedef struct {
     double height, inner, outer; /* of its axis; radii */
@@ -114,14 +108,10 @@ typedef struct {
     double absorption;           /* coefficient of the glass, 1/m */
 } GlassTube;
 
-_Static_assert(sizeof(GlassTube) == 5 * sizeof(double), "the layout of a packed tube");
-
 /* A sine wave of the floor's brightness: wavevector, 1/m, phase, relative amplitude. */
 typedef struct {
     double kx, ky, phase, amplitude;
 } FloorWave;
-
-_Static_assert(sizeof(FloorWave) == 4 * sizeof(double), "the layout of a packed wave");
 
 /* What half of a tube does to light: its transmission, and the light that it mirrors. */
 typedef struct {
@@ -165,9 +155,9 @@ static Print print_at(const Ruler *ruler, double x, double y) {
  * the floor's brightness: wavevector, 1/m, phase, relative amplitude; oil: absorption coefficients of red, green and
  * blue, 1/m; light: light of the still parts, linear; over: transmission of the glass between robot and camera; shine:
  * light mirrored by the glass; floors: x and y of the floor behind each pixel, m. */
-EXPORT void still_picture(const VirtualCamera *camera /* (17) */, const double *spots /* (16, samples, 2) */,
-                          const double colours[3][3], const Ruler *ruler /* (6) */, const GlassTube *tube /* (5) */,
-                          const FloorWave *waves /* (wave_count, 4) */, const double oil[3],
+EXPORT void still_picture(const VirtualCamera *camera, const double *spots /* (16, samples, 2) */,
+                          const double colours[3][3], const Ruler *ruler, const GlassTube *tube,
+                          const FloorWave *waves /* (wave_count) */, const double oil[3],
                           float *light /* (rows, columns, 3) */, float *over /* (rows, columns) */,
                           float *shine /* (rows, columns) */, float (*floors)[2] /* (rows, columns, 2) */,
                           int64_t samples, int64_t wave_count, int64_t rows, int64_t columns) {

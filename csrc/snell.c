@@ -102,14 +102,14 @@ void point_of_pixel(const Camera *c, const double pixel[2], double level, double
 }
 
 /* Project points, m, to pixels (u, v); NaN behind the camera. */
-EXPORT void pixels_of_points(const double (*points)[3] /* (count, 3) */, const Camera *camera /* (17) */,
+EXPORT void pixels_of_points(const double (*points)[3] /* (count, 3) */, const Camera *camera,
                              double (*pixels)[2] /* (count, 2) */, int64_t count) {
     double share = 0.0;
     for (int64_t i = 0; i < count; i++) pixel_near(camera, points[i], &share, pixels[i]);
 }
 
 /* Points at the height `level` on the rays of pixels, m; NaN where a ray does not reach it. */
-EXPORT void points_of_pixels(const double (*pixels)[2] /* (count, 2) */, double level, const Camera *camera /* (17) */,
+EXPORT void points_of_pixels(const double (*pixels)[2] /* (count, 2) */, double level, const Camera *camera,
                              double (*points)[3] /* (count, 3) */, int64_t count) {
     for (int64_t i = 0; i < count; i++) point_of_pixel(camera, pixels[i], level, points[i]);
 }

@@ -12,8 +12,6 @@ typedef struct {
     double right[3], up[3], back[3];  /* axes of the camera: to the right and up in the picture, away from the scene */
 } Camera;
 
-_Static_assert(sizeof(Camera) == 17 * sizeof(double), "the layout of a packed camera");
-
 /* Pixel (u, v) at which the camera sees a point; NaN behind it. */
 void pixel_of_point(const Camera *camera, const double point[3], double pixel[2]);
 

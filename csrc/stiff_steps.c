@@ -334,11 +334,11 @@ EXPORT void gaps_of(const double *y /* (19) */, double *data /* (size) */, const
 
 /* Write what a run is watched for into `gaps`; return the smallest gap. */
 EXPORT double watched(const double *y /* (19) */, double outside, double *data /* (size) */,
-                      const double *table /* (table_size) */, const double *limits /* (5) */, double rough,
+                      const double *table /* (table_size) */, const Limits *limits, double rough,
                       double *gaps /* (count) */, int64_t size, int64_t table_size, int64_t count) {
     PlaceMemory place;
     const Robot robot = robot_opened(data, table, size, table_size, &place);
-    return watch(&robot, y, outside, (const Limits *)limits, rough, gaps, count);
+    return watch(&robot, y, outside, limits, rough, gaps, count);
 }
 
 /* A run while it is followed. */
@@ -402,23 +402,22 @@ static bool found_step(Run *run) {
  * matters, (19,); a small change of time, s (0: nothing depends on it); a time of the order of the run's, s; limits:
  * where tube and battery end; rough: height of the asperities, m; data: from `packed` of `tube_motion` or `two_links`;
  * table: the robot's table, (0,) for one without walls. */
-EXPORT int64_t advance(double stop, bool clip, int64_t steps, double tolerance, double *memory /* (5) */,
-                       double *y /* (19) */, double *before /* (19) */, double *increments /* (8, 19) */,
-                       double *jacobian /* (8, 8) */, double *gaps /* (count) */,
-                       const double *samples /* (sample_count) */, double *states /* (sample_count, 19) */,
-                       const double *sizes /* (21) */, const double *limits /* (5) */, double rough,
-                       double *data /* (size) */, const double *table /* (table_size) */, int64_t count,
+EXPORT int64_t advance(double stop, bool clip, int64_t steps, double tolerance, Memory *memory, double *y /* (19) */,
+                       double *before /* (19) */, double *increments /* (8, 19) */, double *jacobian /* (8, 8) */,
+                       double *gaps /* (count) */, const double *samples /* (sample_count) */,
+                       double *states /* (sample_count, 19) */, const double *sizes /* (21) */, const Limits *limits,
+                       double rough, double *data /* (size) */, const double *table /* (table_size) */, int64_t count,
                        int64_t sample_count, int64_t size, int64_t table_size) {
     PlaceMemory place;
     Run run = {
         .robot = robot_opened(data, table, size, table_size, &place),
         .sizes = (const Sizes *)sizes,
-        .limits = (const Limits *)limits,
+        .limits = limits,
         .rough = rough,
         .tolerance = tolerance,
         .stop = stop,
         .clip = clip,
-        .memory = (Memory *)memory,
+        .memory = memory,
         .count = count,
         .step.u = (double (*)[STATES])increments,
     };

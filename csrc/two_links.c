@@ -30,8 +30,8 @@ TwoLinks two_links_opened(const double *packed, int64_t size) {
  * across n in the channel's section and s' = ds/dn_1,
  *
  *     j_U = n + s' (t.e_1)/|c| t,   j_Omega = s' e_1 x n + x e_1 x j_U */
-static double film_at_ring(const Ring *ring, const Wall *wall, const State *y, const double rotation[3][3],
-                           double j[6]) {
+EXPORT double film_of(const State *y, const double (*rotation)[3] /* (3, 3) */, const Wall *wall, const Ring *ring,
+                      double j[6]) {
     double side = y->position[1] + rotation[1][0] * ring->x, up = y->position[2] + rotation[2][0] * ring->x;
     const double distance = hypot(side, up), a = ring->radius, b = ring->half;
     const bool near_axis = distance < 1e-12 * wall->radius;
@@ -70,7 +70,7 @@ static void add_films(const TwoLinks *robot, const State *y, const double rotati
     seen->film = INFINITY;
     seen->pressed = 0.0;
     for (const Ring *ring = robot->rings; ring < robot->rings + robot->ring_count; ring++) {
-        double j[6], film = film_at_ring(ring, robot->wall, y, rotation, j), pressed = 0.0;
+        double j[6], film = film_of(y, rotation, robot->wall, ring, j), pressed = 0.0;
         seen->film = smaller(seen->film, film);
         if (film >= ring->reach) continue;
         film = larger(film, 1e-9 * rough);
@@ -123,12 +123,6 @@ double two_links_film(const TwoLinks *robot, const State *y) {
     double rotation[3][3], j[6], thinnest = INFINITY;
     axes_of(y, rotation);
     for (const Ring *ring = robot->rings; ring < robot->rings + robot->ring_count; ring++)
-        thinnest = smaller(thinnest, film_at_ring(ring, robot->wall, y, rotation, j));
+        thinnest = smaller(thinnest, film_of(y, rotation, robot->wall, ring, j));
     return thinnest;
-}
-
-/* Return the film between the wall and the surface about one ring of the robot, m; fill its loss per rate. */
-EXPORT double film_of(const double *y /* (19) */, const double *rotation /* (3, 3) */, const double *wall /* (4) */,
-                      const double *ring /* (6) */, double *j /* (6) */) {
-    return film_at_ring((const Ring *)ring, (const Wall *)wall, (const State *)y, (const double (*)[3])rotation, j);
 }

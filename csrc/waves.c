@@ -56,14 +56,10 @@ typedef struct {
     double wavenumber, angle, decay, amplitude; /* K, a_0, c/L_t (0 or less: no taper), largest radius */
 } Wave;
 
-_Static_assert(sizeof(Wave) == 4 * sizeof(double), "the layout of a packed wave");
-
 /* Derivatives with height of the shift along (e) and across (f), and of the magnification (g). */
 typedef struct {
     double e, f, g;
 } Tilt;
-
-_Static_assert(sizeof(Tilt) == 3 * sizeof(double), "the layout of a packed tilt");
 
 static Wave with_taper(const Wave *wave) {
     Wave found = *wave;
@@ -102,7 +98,7 @@ static Crossing crossing_of(const Wave *w, const Tilt *tilt, double xi, double p
  * ridge: the strip; xi: distance from the root of each row, m; tilt: of each row; packed: of the wire; step: width of a
  * column, m; every: stride of the rows; turns: cosine and sine of the phases; scores: the score of each phase. */
 EXPORT void wave_scores(const double *ridge /* (rows, columns) */, const double *xi /* (rows) */,
-                        const Tilt *tilt /* (rows, 3) */, const Wave *packed /* (4) */, double step, int64_t every,
+                        const Tilt *tilt /* (rows) */, const Wave *packed, double step, int64_t every,
                         const double (*turns)[2] /* (phases, 2) */, double *scores /* (phases) */, int64_t rows,
                         int64_t columns, int64_t phases) {
     const Wave wave = with_taper(packed);
@@ -267,9 +263,9 @@ static void assess(const Strip *strip, Row *rows, const View *view, const Normal
  * handedness (0 as assumed, -2 opposite) and of the relative error of the amplitude, mean ridge; unchanged where too
  * little is in view. */
 EXPORT void wave_fit(const double *ridge /* (count, columns) */, const double *xi /* (count) */,
-                     const Tilt *tilt /* (count, 3) */, const Wave *packed /* (4) */, double phase, double step,
-                     double width, double usual, double likely_offset, double likely_lean,
-                     double *work /* (count, 10) */, double answer[10], int64_t count, int64_t columns) {
+                     const Tilt *tilt /* (count) */, const Wave *packed, double phase, double step, double width,
+                     double usual, double likely_offset, double likely_lean, double *work /* (count, 10) */,
+                     double answer[10], int64_t count, int64_t columns) {
     const Wave wave = with_taper(packed);
     const Strip strip = {ridge, xi, tilt, count, columns, step, usual};
     const double length = xi[count - 1] - xi[0];

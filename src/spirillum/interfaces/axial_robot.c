@@ -1,26 +1,24 @@
 /* A robot in axial motion, on the equations and the integrator of `spirillum.simulate`: axial.c of csrc/.
  *
- * VALUES of robot.h are the parameters, in the order of the enumeration; CURVE is that of a motor whose torque stands in
+ * VALUES of robot.h are the parameters, those of `Axial`; CURVE is that of a motor whose torque stands in
  * place of the current (0: of none).
  */
+#include <stddef.h>
 #include <string.h>
 
 #include "axial.h"
 #include "model.h"
 
 enum {
-    TORQUE, EMF, INDUCTANCE, CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE, VOLTAGE, INTERNAL, POLARITY,
-    SPEED, BODY, TAIL, SPEED_FLOW, BODY_FLOW, TAIL_FLOW, VALUE_COUNT
-};
-/* The state, and integrals of I^2 and R I^2. */
-enum { CURRENT, POSITION, TAIL_ANGLE, BODY_ANGLE, CHARGE, SQUARE, HEAT, STATE_COUNT };
-enum {
     OUT_POSITION, OUT_TAIL_ANGLE, OUT_BODY_ANGLE, OUT_CHARGE, OUT_SPEED, OUT_TAIL_RATE, OUT_BODY_RATE, OUT_MOTOR_RATE,
     OUT_CURRENT, OUT_TORQUE, OUT_VOLTAGE, OUT_POWER, OUTPUT_COUNT
 };
-_Static_assert(VALUE_COUNT == PARAMETERS && STATE_COUNT == STATE && OUTPUT_COUNT == OUTPUTS, "the numbers of robot.h");
+_Static_assert(sizeof(Axial) == PARAMETERS * sizeof(double) && sizeof(AxialState) == STATE * sizeof(double)
+                   && OUTPUT_COUNT == OUTPUTS,
+               "the numbers of robot.h");
 
 static const double START[PARAMETERS] = VALUES, TORQUES[25] = CURVE;
+static const Curve *const OF_TORQUES = (const Curve *)TORQUES;
 static const double FINENESS = 16.0; /* pieces of a step as in a run of `simulate` */
 
 void start_model(Model *m) {
@@ -32,41 +30,44 @@ void start_model(Model *m) {
 }
 
 const char *parameter_problem(int parameter, double value) {
-    return parameter == INDUCTANCE && !(value > 0.0) ? "the inductance is not positive" : NULL;
+    return parameter == offsetof(Axial, motor.inductance) / sizeof(double) && !(value > 0.0) ? "the inductance is not positive" : NULL;
 }
 
 void observe_model(Model *m) { (void)m; }
 
 const char *advance_model(Model *m, double length) {
+    const Axial *robot = (const Axial *)m->p;
+    AxialState *state = (AxialState *)m->state;
     const double duty = duty_of(m);
-    if (TORQUES[0] > 0.0)
-        advance_on_curve(m->p, m->state, length, &duty, &m->flow, TORQUES, 1);
+    if (OF_TORQUES->points > 0.0)
+        advance_on_curve(robot, state, length, &duty, &m->flow, OF_TORQUES, 1);
     else
-        advance_axial(m->p, m->state, length, &duty, &m->flow, FINENESS, 1);
+        advance_axial(robot, state, length, &duty, &m->flow, FINENESS, 1);
     m->time += length;
-    const bool finite = isfinite(m->state[CURRENT]) && isfinite(m->state[CHARGE]);
+    const bool finite = isfinite(state->current) && isfinite(state->charge);
     return finite ? NULL : "the motor's current cannot be integrated with these numbers";
 }
 
-static double moved(const Model *m, int per_torque, int per_flow) {
-    return m->p[per_torque] * m->p[TORQUE] * m->state[CURRENT] + m->p[per_flow] * m->flow;
-}
-
 double output_of(const Model *m, int output) {
-    const double *p = m->p, i = m->state[CURRENT], voltage = p[VOLTAGE] - p[INTERNAL] * fabs(i);
-    const double tail = moved(m, TAIL, TAIL_FLOW), body = moved(m, BODY, BODY_FLOW);
+    const Axial *robot = (const Axial *)m->p;
+    const AxialState *state = (const AxialState *)m->state;
+    const Motor *motor = &robot->motor;
+    const double i = state->current, torque = motor->torque_constant * i;
+    const double voltage = motor->voltage - motor->internal_resistance * fabs(i);
+    const double tail = robot->tail * torque + robot->tail_flow * m->flow;
+    const double body = robot->body * torque + robot->body_flow * m->flow;
     switch (output) {
-    case OUT_POSITION: return m->state[POSITION];
-    case OUT_TAIL_ANGLE: return m->state[TAIL_ANGLE];
-    case OUT_BODY_ANGLE: return m->state[BODY_ANGLE];
-    case OUT_CHARGE: return m->state[CHARGE];
-    case OUT_SPEED: return moved(m, SPEED, SPEED_FLOW);
+    case OUT_POSITION: return state->position;
+    case OUT_TAIL_ANGLE: return state->tail_angle;
+    case OUT_BODY_ANGLE: return state->body_angle;
+    case OUT_CHARGE: return state->charge;
+    case OUT_SPEED: return robot->speed * torque + robot->speed_flow * m->flow;
     case OUT_TAIL_RATE: return tail;
     case OUT_BODY_RATE: return body;
     case OUT_MOTOR_RATE: return tail - body;
     case OUT_CURRENT: return i;
-    case OUT_TORQUE: return p[TORQUE] * i;
+    case OUT_TORQUE: return torque;
     case OUT_VOLTAGE: return voltage;
-    default: return p[POLARITY] * duty_of(m) * voltage * i;
+    default: return motor->polarity * duty_of(m) * voltage * i;
     }
 }

@@ -88,7 +88,7 @@ static double watched_at(Free *f, const Limits *limits, const double *end, doubl
     const double time = f->memory.last_time + share * (f->memory.time - f->memory.last_time);
     interpolate(share, f->before, end, f->increments[0], inner);
     const double outside = place == GAPS + WITHIN ? outside_at(f, time, inner) : 0.0;
-    watched(inner, outside, f->data, TABLE, (const double *)limits, ROUGHNESS, gaps, DATA_SIZE, TABLE_SIZE, WATCHING);
+    watched(inner, outside, f->data, TABLE, limits, ROUGHNESS, gaps, DATA_SIZE, TABLE_SIZE, WATCHING);
     return gaps[place];
 }
 
@@ -141,12 +141,12 @@ static Arrival follow(Free *f, double duty, double flow, double stop, bool clip,
     pack(f, duty, flow);
     const double outside = outside_at(f, f->memory.time, run);
     pack(f, duty, flow);
-    watched(run, outside, f->data, TABLE, (const double *)&limits, ROUGHNESS, f->gaps, DATA_SIZE, TABLE_SIZE, WATCHING);
+    watched(run, outside, f->data, TABLE, &limits, ROUGHNESS, f->gaps, DATA_SIZE, TABLE_SIZE, WATCHING);
     for (;;) {
         memcpy(gaps, f->gaps, sizeof gaps);
         const int64_t status
-            = advance(stop, clip, STEPS, TOLERANCE, (double *)&f->memory, run, f->before, f->increments[0], jacobian, f->gaps,
-                      samples, states[0], sizes, (const double *)&limits, ROUGHNESS, f->data, TABLE, WATCHING,
+            = advance(stop, clip, STEPS, TOLERANCE, &f->memory, run, f->before, f->increments[0], jacobian, f->gaps,
+                      samples, states[0], sizes, &limits, ROUGHNESS, f->data, TABLE, WATCHING,
                       answered ? 0 : 1, DATA_SIZE, TABLE_SIZE);
         if (f->memory.answered > 0.0) {
             memcpy(y, states[0], sizeof states[0]);
