@@ -23,7 +23,7 @@ PACKAGE = SOURCES.parent / "src/spirillum/kernels"
 SUFFIXES = {"win": ".dll", "mac": ".dylib"}
 """Of libraries, by the first letters of a wheel's tag; else .so."""
 FLAGS = (
-    *("-std=c11", "-O2", "-fPIC", "-fvisibility=hidden"),
+    *("-std=c11", "-O2", "-g0", "-fPIC", "-fvisibility=hidden"),  # zig adds debugging information, gcc does not
     # The same numbers on every processor: no fused products, no sums in another order; `errno` and traps are not read.
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     "-fopenmp-simd",  # heeds `omp simd`, which needs no library
