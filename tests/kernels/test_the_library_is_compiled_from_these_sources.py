@@ -19,6 +19,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core, native, two_links
 from spirillum.kernels.core import contact_offset, film_coordinates, spline_weights
 
+CPU = Path("/proc/cpuinfo")
 BUILD = Path(__file__).parents[2] / "csrc" / "build.py"
 
 
@@ -78,7 +79,23 @@ def test_zig_compiles_for_every_platform(
     """As where no compiler is installed, and for wheels; its clang knows other pragmas than gcc."""
     pytest.importorskip("ziglang")
     monkeypatch.setenv("SPIRILLUM_WHEEL", platform)
-    assert len(build["compile_all"](tmp_path)) == (2 if platform.endswith(("x86_64", "amd64")) else 1)
+    made = build["compile_all"](tmp_path)
+    assert len(made) == (2 if platform.endswith(("x86_64", "amd64")) else 1)
+    if platform == "manylinux_2_17_x86_64" and CPU.exists():
+        assert bool(ctypes.CDLL(str(made[0])).has_wide_vectors()) == takes_wide_build()
+
+
+def takes_wide_build() -> bool:
+    """What the system says of the processor."""
+    flags = next((line for line in CPU.read_text().splitlines() if line.startswith("flags")), "").split()
+    return {"avx2", "bmi2", "fma"} <= set(flags)
+
+
+def test_the_wide_build_is_for_processors_that_take_it() -> None:
+    if not CPU.exists():
+        pytest.skip("the system does not say what the processor takes")
+    library = next(Path(native.__file__).parent.glob("_core.*"))
+    assert bool(ctypes.CDLL(str(library)).has_wide_vectors()) == takes_wide_build()
 
 
 def test_a_result_of_another_type_or_order_is_refused() -> None:
