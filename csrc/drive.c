@@ -62,10 +62,11 @@ static double root_of(const Search *s) {
         const double next = good ? trial.newton : 0.5 * (low + high);
         last = fabs(next - i);
         i = next;
+        if (good && last <= 1e-9 * fabs(i)) return i; /* the error is the square of the step */
         trial = trial_at(s, i);
         if (!(last > 1e-9 * fabs(i))) break;
     }
-    /* Newton's error is the square of the step before; where rounding led out of the bracket, the last step halved it. */
+    /* Where rounding led out of the bracket, the last step halved it. */
     return isfinite(trial.newton) ? clamped(trial.newton, low, high) : i;
 }
 
