@@ -15,19 +15,24 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 MAP = (ROOT / "CONTRIBUTING.md").read_text("utf-8").split("## Map\n")[1].split("## Habits")[0]
 
 
-def _definitions(path: Path) -> list[str]:
-    body = ast.parse(path.read_text("utf-8")).body
+@pytest.fixture(scope="module")
+def bodies() -> list[list[ast.stmt]]:
+    """What stands in each module."""
+    return [ast.parse(path.read_text("utf-8")).body for path in MODULES]
+
+
+def _definitions(body: list[ast.stmt]) -> list[str]:
     return [node.name for node in body if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.decorator_list]
 
 
-def test_public_class_names_are_unique() -> None:
-    trees = [ast.parse(path.read_text("utf-8")) for path in MODULES]
-    names = Counter(node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))
+def test_public_class_names_are_unique(bodies: list[list[ast.stmt]]) -> None:
+    names = Counter(node.name for body in bodies for node in body if isinstance(node, ast.ClassDef))
     assert [name for name, count in names.items() if count > 1 and not name.startswith("_")] == []
 
 
-def test_no_module_defines_a_name_twice() -> None:
-    assert [path.name for path in MODULES if max(Counter(_definitions(path)).values(), default=1) > 1] == []
+def test_no_module_defines_a_name_twice(bodies: list[list[ast.stmt]]) -> None:
+    counts = [max(Counter(_definitions(body)).values(), default=1) for body in bodies]
+    assert [path.name for path, count in zip(MODULES, counts, strict=True) if count > 1] == []
 
 
 @pytest.mark.parametrize("name", ["answer", "options", "warnings", "loading"])

@@ -167,7 +167,7 @@ def test_the_trial_of_a_posterior_is_the_run_of_its_median(tmp_path: Path) -> No
 
 def test_a_posterior_of_another_channel_is_flagged_or_left_out(tmp_path: Path) -> None:
     """A gap is that of its channel; a roughness acts in any, outside the geometry that it was fitted to."""
-    narrow: Any = {"duration": "0.1 s", "interval": True}
+    narrow: Any = {"duration": "0.1 s", "interval": True, "in_tube": {"wait": "1 s"}}
     plain = sp.predict("biorob2012-narrow", **narrow).trial
     fitted = {name: posteriors.write_trials(tmp_path / f"{name}.nc", {name: 3e-5}) for name in ("gap", "roughness")}
     other = sp.predict("biorob2012-narrow", posterior=fitted["gap"], **narrow)

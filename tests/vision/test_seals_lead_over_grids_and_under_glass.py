@@ -23,33 +23,42 @@ CAMERA = Optics((320, 240), 350.0, 0.2, 0.015)
 
 
 @remembered
-def layers(flat):
-    """What does not change from frame to frame: paper with lines every 2 mm both ways, no robot; both bodies' films."""
-    away = replace(flat, start=(1.0, 0.0))
+def layers(away):
+    """A floor without its robot, and with lines every 2 mm both ways."""
     empty = away.draw(0.0).astype(float)
-    paper, lines = empty.copy(), np.arange(-0.1, 0.1, flat.spacing)
+    paper, lines = empty.copy(), np.arange(-0.1, 0.1, away.spacing)
     for axis in (0, 1):
         ends = np.zeros((lines.size, 3))
         ends[:, axis] = lines
-        for at in flat.pixels(ends)[:, axis]:
+        for at in away.pixels(ends)[:, axis]:
             there = np.clip(1.0 - np.abs(np.arange(paper.shape[1 - axis]) - at), 0.0, 1.0) * 0.5
             shade = there[None, :, None] if axis == 0 else there[:, None, None]
             paper += shade * (np.array([40.0, 60.0, 140.0]) - paper)
-    return empty, paper, *(replace(flat, body=(level,) * 3) for level in (0, 255))
+    return empty, paper
+
+
+def layers_of(film):
+    """The layers of a film: the same wherever its robot is."""
+    return layers(away=replace(film, start=(1.0, 0.0)))
+
+
+@remembered
+def with_body(film, level):
+    """The film of a body of one shade of grey."""
+    return replace(film, body=(level,) * 3)
 
 
 @remembered
 def drawn_robot(flat, time):
     """A frame with a black body; the share of each pixel that the body fills, and that the robot does."""
-    empty, _, black, white = layers(flat=flat)
-    dark, bright = black.draw(time).astype(float), white.draw(time).astype(float)
+    dark, bright = (with_body(film=flat, level=level).draw(time).astype(float) for level in (0, 255))
     body = ((bright - dark) / 255.0).mean(axis=2, keepdims=True)
-    return dark, body, np.clip(np.abs(dark - empty).sum(axis=2, keepdims=True) / 24.0, 0.0, 1.0)
+    return dark, body, np.clip(np.abs(dark - layers_of(flat)[0]).sum(axis=2, keepdims=True) / 24.0, 0.0, 1.0)
 
 
 def on_paper(flat, time, *, clear):
     """A drawn frame on the paper; of the body a share is seen that the paper leaves."""
-    _, paper, *_ = layers(flat=flat)
+    _, paper = layers_of(flat)
     dark, body, robot = drawn_robot(flat=flat, time=time)
     under = robot * dark + (1.0 - robot) * paper
     return np.clip(under + body * (clear * paper + (1.0 - clear) * np.array(flat.body)), 0, 255).astype(np.uint8)
@@ -93,7 +102,7 @@ def test_the_speed_over_a_grid_is_the_robots(film, tmp_path, clear):
 def test_a_robot_that_a_hand_hides_or_takes_away_keeps_its_speed(film, tmp_path, hand):
     """Behind a hand nothing looks like a seal; on bare paper the outline may stick to lines."""
     setup = written(film, tmp_path, clear=0.0)
-    _, paper, *_ = layers(flat=film)
+    _, paper = layers_of(film)
     covered = np.full(paper.shape, (120, 140, 190)) if hand else paper[:, :, ::-1]
     for index in range(8, 14) if hand else range(14, len(film.times)):
         cv2.imwrite(str(tmp_path / "film" / f"{index:02d}.png"), covered.astype(np.uint8))
