@@ -328,7 +328,6 @@ anything = st.one_of(
 )
 
 
-@settings(max_examples=100)
 @given(text=anything, kind=st.sampled_from(sorted(KINDS)))
 @example(text="2 m\nm", kind="length")
 @example(text="18 m\nnonsense", kind="length")

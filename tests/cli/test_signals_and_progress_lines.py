@@ -57,7 +57,7 @@ def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tup
     )
     assert process.stderr is not None
     said = process.stderr.readline()  # it is at work
-    time.sleep(0.5)
+    time.sleep(0.2)
     (os.killpg if group else os.kill)(process.pid, number)
     _, rest = process.communicate(timeout=60)
     end = time.monotonic() + 20.0

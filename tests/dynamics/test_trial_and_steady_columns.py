@@ -91,7 +91,7 @@ def test_lines_end_between_words_at_80_columns(run: Callable[..., Any], monkeypa
     [
         pytest.param({"body.mass": "9 g"}, {"duration": "3 s"}, "", id="light"),
         pytest.param({"body.mass": "7.82 g"}, {"duration": "3 s"}, "", id="neutral"),
-        pytest.param({"body.mass": "7 g"}, {"duration": "3 s"}, "", id="rising"),
+        pytest.param({"body.mass": "3 g"}, {"duration": "3 s"}, "", id="rising"),
         pytest.param({}, {"placement": {"flow": "1 mm/s"}}, "", id="imposed flow"),
         pytest.param({}, {"placement": {"ends": "closed"}}, "", id="closed ends"),
         pytest.param({}, {"tail_rate": "1.2 Hz"}, "a tail rate is prescribed", id="prescribed tail rate"),
@@ -114,7 +114,7 @@ def test_a_missing_trial_has_its_reason(overrides: dict[str, Any], options: dict
 @pytest.mark.parametrize(
     ("overrides", "options", "state"),
     [
-        pytest.param({"body.mass": "7 g"}, {}, "ceiling", id="rising"),
+        pytest.param({"body.mass": "3 g"}, {}, "ceiling", id="rising"),
         pytest.param({}, {"placement": {"flow": "1 mm/s"}}, "steady", id="imposed flow"),
         pytest.param({}, {"placement": {"ends": "closed"}}, "steady", id="closed ends"),
         pytest.param({}, {"tail_rate": "1.2 Hz"}, "a tail rate is prescribed", id="prescribed tail rate"),

@@ -231,7 +231,9 @@ def test_released_robot_takes_remote_and_duty(released: Path) -> None:
 
 
 @needs_compiler
-def test_released_robot_ends_at_the_end_of_its_channel(tmp_path: Path) -> None:
+def test_released_robot_ends_at_the_end_of_its_channel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = tuple(option for option in build._OPTIONS if option != "-O2")
+    monkeypatch.setattr(build, "_OPTIONS", quick)
     short = sp.load(WIDE, **{"channel.length": "105.8 mm"})
     plant = sp.Plant(short)
     moment = plant.step(2.0)
