@@ -142,7 +142,7 @@ def _spread(limit: Limit, index: np.ndarray[Any, Any], size: int) -> Limit:
         values = np.asarray(column)
         return values[index] if values.size == few and size > 1 else column
 
-    return replace(limit, value=all_of(limit.value), bound=all_of(limit.bound), holds=all_of(limit.holds))
+    return limit._replace(value=all_of(limit.value), bound=all_of(limit.bound), holds=all_of(limit.holds))
 
 
 def _fast(batch: RobotBatch) -> tuple[Samples, Samples]:

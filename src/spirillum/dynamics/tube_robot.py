@@ -37,7 +37,7 @@ _LINE_STATIONS_PER_TURN = 64
 class Surroundings:
     """What surrounds a robot in its tube."""
 
-    ends: float = core.CLOSED
+    ends: int = core.CLOSED
     """`kernel.CLOSED`, `kernel.OPEN` or `kernel.IMPOSED`."""
     length: float = np.inf
     """L_eff of open ends, m."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -20,8 +19,7 @@ _WORDS: dict[str, dict[str, Any]] = {row.pop("name"): dict(row) for row in rows_
 """Field, relation, unit, reason and flag of requirements by their names."""
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     """One requirement on a field, for every robot of a batch."""
 
     field: str
@@ -46,12 +44,12 @@ class Limit:
     ) -> Limit:
         """Require `value` in `relation` to `bound`; equality is tested to rounding error."""
         limit = np.atleast_1d(np.asarray(bound, dtype=float))
-        slack = 1e-12 * np.abs(np.where(np.isinf(limit), 0.0, limit))
         if relation == "more than":
-            holds = value > limit
-        elif relation == "less than":
-            holds = value < limit
-        elif relation == "at least":
+            return cls(field, value, relation, limit, unit, why, value > limit, flag)
+        if relation == "less than":
+            return cls(field, value, relation, limit, unit, why, value < limit, flag)
+        slack = 1e-12 * np.abs(np.where(np.isinf(limit), 0.0, limit))
+        if relation == "at least":
             holds = value >= limit - slack
         elif relation == "at most":
             holds = value <= limit + slack

@@ -7,7 +7,6 @@ Above `LOW_REYNOLDS` an answer has a warning. Above `BEYOND_STOKES` it is refuse
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
@@ -77,7 +76,7 @@ def is_stokes_flow(batch: RobotBatch, limits: Iterable[Limit]) -> Flags:
 def _refused(limits: Iterable[Limit]) -> list[Limit]:
     """Limits on Reynolds numbers at `BEYOND_STOKES`; a limit without a Reynolds number, NaN, stays as it is."""
     return [
-        replace(limit, bound=np.full(1, BEYOND_STOKES), holds=~(np.asarray(limit.value) > BEYOND_STOKES))
+        limit._replace(bound=np.full(1, BEYOND_STOKES), holds=~(np.asarray(limit.value) > BEYOND_STOKES))
         for limit in limits
     ]
 

@@ -11,7 +11,6 @@ reproduces (1), (2), (4) and (5). `L_t` of the printed equations is the wire's a
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -190,7 +189,7 @@ class Sbt(SwimmerModel):
         inside = limits[-1].holds
         for name, value in (("1/chi", f.torque), ("q", f.q), ("Psi", f.Psi), ("psi", f.psi)):
             limit = Limit.named("helix-function", value, 0.0, name=name)
-            limits.append(replace(limit, holds=limit.holds | ~inside))
+            limits.append(limit._replace(holds=limit.holds | ~inside))
         return limits
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
