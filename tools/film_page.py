@@ -1,4 +1,4 @@
-"""Film the page in use for the README and the documentation: docs/images/page.webp, and its first picture, page.png.
+"""Film the page in use for the documentation: docs/images/page.webp with its first picture, page.png; page-measure.png.
 
     python tools/film_page.py
 
@@ -16,10 +16,13 @@ import time
 from pathlib import Path
 from shutil import which
 from signal import SIGINT
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
+
+import spirillum as sp
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
 FLAGS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
@@ -78,6 +81,30 @@ def filmed(page: Page) -> list[Image.Image]:
     return pictures + swimming(page, 8)
 
 
+def measured(page: Page, film: Path) -> None:
+    """A film with its setup, and the magnifier over its ruler."""
+    page.click("#tab-measure")
+    until(page, "spirillum.measure?.state")
+    page.set_input_files("#film-files", film)
+    until(page, "spirillum.measure.pointer.image && spirillum.measure.strips.length")
+    setup = {
+        "markers-spacing": "2 mm",
+        "markers-height": "0 mm",
+        "camera-height": "210 mm",
+        "tank-surface": "60 mm",
+        "tank-index": "1.4",
+        "robot-axis_height": "11.5 mm",
+    }
+    for name, value in setup.items():  # that of the film
+        page.fill(f"#{name}", value)
+        page.keyboard.press("Enter")
+    page.click("#point-ruler")
+    box = page.locator(".pointing").bounding_box() or {}
+    page.mouse.move(box["x"] + 0.51 * box["width"], box["y"] + 0.26 * box["height"])
+    time.sleep(1.0)
+    page.screenshot(path=IMAGES / "page-measure.png")
+
+
 def main() -> None:
     """Start the page, film it, end it."""
     server = subprocess.Popen(
@@ -94,6 +121,10 @@ def main() -> None:
             page = browser.new_page(viewport=SIZE, color_scheme="light")
             page.goto(address[0])
             pictures = filmed(page)
+            with TemporaryDirectory() as folder:
+                sp.render("biorob2012-wide", Path(folder) / "film.mp4", model="tube", trial={"duration": "2 s"})
+                page.set_viewport_size({"width": 1440, "height": 900})
+                measured(page, Path(folder) / "film.mp4")
             browser.close()
     finally:
         server.send_signal(SIGINT)

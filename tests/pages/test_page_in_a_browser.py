@@ -111,7 +111,11 @@ def test_run_replays_alone_and_equals_its_file(tab: Any, browser: Any, tmp_path:
     assert shown["time"] == float(run.time[last])
     assert shown["position"] == run.position.values[last].tolist()
     assert shown["values"]["forward_velocity"] == float(run.forward_velocity[last])
+    tab.page.click("#tab-compare")
+    tab.until("spirillum.scene.lanes.length === 2 && !document.getElementById('live').hidden")
+    assert tab.page.get_attribute("#tab-compare", "aria-selected") == "true"
     tab.page.click("#tab-swim")
+    tab.until("spirillum.scene.lanes.length === 1")
 
     tab.command(do="step")
     tab.command(do="step")

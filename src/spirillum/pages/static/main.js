@@ -273,7 +273,7 @@ function open(tab) {
   if (tab === "swim" && state.lanes.length > 1) send({ do: "compare", value: false });
   if (tab === "replay" && !state.replay && !state.loading) askForRun();
   if (tab === "measure") state.measure ??= new Measure($("measure"), () => state.chosen, (run) => begin(run, state.tab === "measure"));
-  if (tab !== "compare" || state.lanes.length > 1) select(tab);
+  select(tab);  // of Compare, too: the second robot comes where the first one is seen, not a replay
 }
 
 function setPace(factor) {
