@@ -48,7 +48,7 @@ def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, An
 
 
 _ENDS = ("value", "low", "high")
-_LABELS = {"advance_per_radian": "advance"}
+_LABELS = {"advance_per_radian": "advance per turn"}
 """Words for quantities whose names do not fit the unit that people read: mm for a turn."""
 
 

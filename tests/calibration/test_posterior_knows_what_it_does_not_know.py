@@ -41,6 +41,13 @@ def test_interval_of_each_tail_holds_its_own_mean(wrong: Any) -> None:
         assert np.count_nonzero(inside) >= seen.size - 1
 
 
+def test_draws_do_not_depend_on_the_number_of_processes(made: Callable[..., Path]) -> None:
+    path = made(presets=(WIDE,))
+    few = Sampling(ensembles=3, walkers=24, warm_up=5, steps=20, doublings=1)
+    alone, shared = (sp.calibrate(path, WIDE, sampling=few, model="sbt", workers=count) for count in (1, 2))
+    np.testing.assert_array_equal(alone.posterior.z, shared.posterior.z)
+
+
 def test_chains_that_have_not_mixed_are_refused_loudly(
     made: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

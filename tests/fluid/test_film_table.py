@@ -232,5 +232,5 @@ def test_table_of_a_sphere_turns_with_it(monkeypatch):
 def test_bodies_without_a_table_are_refused():
     with pytest.raises(InputError, match="does not fit"):
         FilmTable.of(CAPSULE, 8e-3)
-    with pytest.raises(InputError, match="straight sides"):
+    with pytest.raises(InputError, match="straight side of"):
         FilmTable.of(body_outline("capsule", 2 * A, 19e-3, 0.0, "hemisphere", "hemisphere"), TUBE)

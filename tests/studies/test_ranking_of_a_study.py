@@ -186,6 +186,6 @@ def test_a_study_that_was_changed_prints_what_it_can(changed: Callable[[xr.Datas
 def test_a_ranking_of_robots_held_in_a_tube_says_so() -> None:
     held = ranking_of(sp.study({"robots": ["biorob2012-wide"], "models": ["tube"]}))
     assert held.held
-    assert held.message.startswith("fastest held: biorob2012-wide, 0.5349 mm/s")
-    assert best_in_words(held.best[0].to_dict(), held=held.held).startswith("fastest held: biorob2012-wide")
+    assert held.message.startswith("fastest at a fixed pose: biorob2012-wide, 0.5349 mm/s")
+    assert best_in_words(held.best[0].to_dict(), held=held.held).startswith("fastest at a fixed pose: biorob2012-wide")
     assert not ranking_of(sp.study({"robots": ["biorob2012-wide"], "models": ["rft"]})).held

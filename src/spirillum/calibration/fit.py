@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -57,6 +57,9 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, WALLED, ModelChoice
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
 
 
 def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
@@ -112,8 +115,9 @@ def fit_model(
     prepare: bool = False,
     answer: str = HELD,
     progress: Progress | None = None,
+    beside: ProcessPoolExecutor | None = None,
 ) -> Calibrated:
-    """Fit parameters of a model to observed speeds and rates."""
+    """Fit parameters of a model to observed speeds and rates; `beside` is a process that takes half of the sampling."""
     check_choice("method", method, METHODS)
     if friction not in _READINGS:
         raise InputError(
@@ -141,16 +145,26 @@ def fit_model(
             import_optional(library, "method 'posterior'", "posterior")
     problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare, answer=answer)
     inertia_warnings(experiment)
-    if method == "paper":
-        found = _by_paper(problem, friction)
-    else:
-        fit = least_squares_fit(problem)
-        check_identifiable(problem, fit.z)
-        check_plausible(problem, fit.z)
-        report = identified(problem, fit)
-        posterior = None if method == "least-squares" else sampled(problem, fit, sampling, progress)
-        found = _by_draws(problem, fit, report, reading=friction, posterior=posterior)
+    found = _fitted_by(method, problem, friction, sampling, progress, beside)
     return replace(found, model_reason=choice.reason)
+
+
+def _fitted_by(
+    method: str,
+    problem: Problem,
+    friction: str,
+    sampling: Sampling | None,
+    progress: Progress | None,
+    beside: ProcessPoolExecutor | None,
+) -> Calibrated:
+    if method == "paper":
+        return _by_paper(problem, friction)
+    fit = least_squares_fit(problem)
+    check_identifiable(problem, fit.z)
+    check_plausible(problem, fit.z)
+    report = identified(problem, fit)
+    posterior = None if method == "least-squares" else sampled(problem, fit, sampling, progress, beside)
+    return _by_draws(problem, fit, report, reading=friction, posterior=posterior)
 
 
 def _by_paper(problem: Problem, reading: str) -> Calibrated:

@@ -8,7 +8,10 @@ long, and if that does not help the posterior is marked: whoever uses it is refu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +23,9 @@ from spirillum.calibration.likelihood import DISCREPANCY_SCALE, ERROR_SCALE, Den
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError, check_range
 from spirillum.progress import Progress, tell
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ProcessPoolExecutor
 
 LARGEST_RHAT = 1.01  #: Largest R-hat (rank-normalised, split) of a posterior that may be used.
 FEWEST_EFFECTIVE = 400.0  #: Smallest effective sample size, of bulk and tails.
@@ -90,9 +96,13 @@ def _first(items: Sequence[str]) -> str:
 
 
 def sampled(
-    problem: Problem, fit: LeastSquares, sampling: Sampling | None = None, progress: Progress | None = None
+    problem: Problem,
+    fit: LeastSquares,
+    sampling: Sampling | None = None,
+    progress: Progress | None = None,
+    beside: ProcessPoolExecutor | None = None,
 ) -> Posterior:
-    """Draw from the posterior."""
+    """Draw from the posterior, every second ensemble in the process beside this one."""
     how = sampling or Sampling()
     density = Density(problem)
     walkers = how.walkers or max(24, 4 * density.size)
@@ -101,9 +111,12 @@ def sampled(
     chains: list[list[Samples]] = [[] for _ in samplers]
     steps, total, warm_up = how.steps, 0, how.warm_up
     for doubling in range(how.doublings + 1):
-        for number, (sampler, chain) in enumerate(zip(samplers, chains, strict=True)):
-            tell(progress, f"sampling, {total + steps} steps", number, len(samplers))
-            chain.append(sampler.run(steps, warm_up))
+        theirs = {} if beside is None else _begun(beside, samplers, steps, warm_up)
+        order = [*(number for number in range(len(samplers)) if number not in theirs), *theirs]
+        for done, number in enumerate(order):
+            tell(progress, f"sampling, {total + steps} steps", done, len(samplers))
+            samplers[number], found_steps = _finished(theirs.get(number), samplers[number], steps, warm_up)
+            chains[number].append(found_steps)
         warm_up = 0
         total += steps
         steps = total
@@ -112,6 +125,32 @@ def sampled(
             break
     tell(progress, "sampling", 1, 1)
     return found
+
+
+def _begun(
+    beside: ProcessPoolExecutor, samplers: Sequence[_Ensemble], steps: int, warm_up: int
+) -> dict[int, Future[tuple[_Ensemble, Samples]]]:
+    """Every second ensemble, sent to the process beside this one; none where that has ended."""
+    with suppress(BrokenProcessPool):
+        return {
+            number: beside.submit(_advanced, samplers[number], steps, warm_up) for number in range(1, len(samplers), 2)
+        }
+    return {}
+
+
+def _finished(
+    theirs: Future[tuple[_Ensemble, Samples]] | None, sampler: _Ensemble, steps: int, warm_up: int
+) -> tuple[_Ensemble, Samples]:
+    """An ensemble after its steps, from the process beside this one where that has begun it; and the steps."""
+    if theirs is not None and not theirs.cancel():
+        with suppress(BrokenProcessPool):  # ended from outside
+            return theirs.result()
+    return _advanced(sampler, steps, warm_up)
+
+
+def _advanced(sampler: _Ensemble, steps: int, warm_up: int) -> tuple[_Ensemble, Samples]:
+    found = sampler.run(steps, warm_up)
+    return sampler, found
 
 
 def _starts(density: Density, fit: LeastSquares, walkers: int, rng: np.random.Generator) -> Samples:

@@ -350,7 +350,7 @@ class Plant:
         """
         old = self._now.field
         if old is None:
-            raise InputError(f"{self.robot.name} has no drive.kind = 'magnetic': no field turns it")
+            raise InputError(f"{self.robot.name} has no magnet: no field turns it; allowed: drive.kind = 'magnetic'")
         field = old.changed(asked, self._now.time)
         if field != old:
             self._links = field.on(self._links)

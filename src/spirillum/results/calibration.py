@@ -21,6 +21,7 @@ from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inp
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.formats.templates import rendered
 from spirillum.notes import Note
+from spirillum.optional_dependencies import import_optional
 from spirillum.progress import Progress, tell
 from spirillum.results.page import Drawings, draw_together, load_figures
 from spirillum.robot.placement import gap_on_asperities
@@ -166,7 +167,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             `friction_coefficient`, `shared_friction`, `roughness`); a second for each of 32 trials of a robot.
         figures: draw figures, which takes some seconds.
         vector: write figures as SVG beside PNG.
-        workers: number of processes; where it is not 1, another one draws half of the figures.
+        workers: number of processes; another one takes half of the work. Results do not depend on it.
         progress: called with stage, number done, and total.
 
     Raises:
@@ -181,8 +182,9 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             folder = stack.enter_context(results_folder(output))
             stack.enter_context(guard_inputs(*inputs))
             check_folder(folder)
-        drawn = figures and folder is not None and workers != 1
-        beside = stack.enter_context(process_beside(_load)) if drawn else None
+        drawn, draws = figures and folder is not None, method == "posterior"
+        shared = workers != 1 and (drawn or draws)
+        beside = stack.enter_context(process_beside(partial(_load, drawn, draws))) if shared else None
         found = fit_model(
             observations,
             robots,
@@ -195,6 +197,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             prepare=prepare,
             answer=answer,
             progress=progress,
+            beside=beside,
         )
         return (
             found
@@ -270,11 +273,14 @@ def _drawings(found: Calibrated) -> Drawings:
     return calibration_drawings(found)
 
 
-def _load() -> None:
-    """Import the figures of a calibration and what drawing takes, in a process that draws beside this one."""
-    import spirillum.view.figures.calibration  # noqa: F401
+def _load(drawn: bool, draws: bool) -> None:  # noqa: FBT001 - called by the pool
+    """Import what the sampler and the figures take, in a process beside this one."""
+    if draws:
+        import_optional("emcee", "method 'posterior'", "posterior")
+    if drawn:
+        import spirillum.view.figures.calibration  # noqa: F401
 
-    load_figures()
+        load_figures()
 
 
 def predictions_text(found: Calibrated) -> str:

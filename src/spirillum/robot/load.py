@@ -244,7 +244,9 @@ def _resolved(path: Path, source: str) -> Path:
 
 def _merged(below: dict[str, Any], above: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:
     if depth > _DEEPEST:
-        raise InputError("tables are nested more deeply than a robot file's are; see `spirillum schema robot`")
+        raise InputError(
+            f"tables are nested more deeply than {_DEEPEST}; allowed: those of a robot file (`spirillum schema robot`)"
+        )
     for key, value in above.items():
         if isinstance(value, Mapping) and isinstance(below.get(key), dict):
             below[key] = _merged(below[key], value, depth + 1)

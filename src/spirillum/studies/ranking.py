@@ -148,7 +148,7 @@ class StudyRanking:
         speed, low, high = (of[by] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
-        held = " held" if self.held else ""
+        held = _AT_A_POSE if self.held else ""
         return f"{RANKED[by].superlative}{held}: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
 
     @property
@@ -175,14 +175,17 @@ class StudyRanking:
         }
 
 
+_AT_A_POSE = " at a fixed pose"
+
+
 def order_in_words(*, settled: bool, held: bool) -> str:
     """Return by which speed robots are ordered."""
-    return "fastest once settled first" if settled else "fastest held first" if held else "fastest first"
+    return "fastest once settled first" if settled else f"fastest{_AT_A_POSE} first" if held else "fastest first"
 
 
 def best_in_words(best: Mapping[str, Any], size: str = "", *, held: bool = False) -> str:
     """Return which robot is the best by a quantity, and how surely; `held` is said of the model's own speed."""
-    what = f"{best['what']}{' held' if held and best['quantity'] == 'forward_velocity' else ''}"
+    what = f"{best['what']}{_AT_A_POSE if held and best['quantity'] == 'forward_velocity' else ''}"
     if best["alike"]:
         return f"{what}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
     sure = f"at {best['places']} of {best['of_places']} poses" if "places" in best else ""

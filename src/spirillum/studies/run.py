@@ -264,7 +264,13 @@ def make_tables(loaded: LoadedStudy, pool: WorkerPool, progress: Progress) -> No
     missing = dict.fromkeys(one for _, batch in groups(loaded) for one in missing_tables(batch, stage))
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
-        tell(progress, f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
+        holds = "for release" if stage == "yaw" else "for fixed poses"
+        tell(
+            progress,
+            f"{ANNOUNCED}, of {len(missing)} robots: they are made first, {holds} (stage {stage}); {cheaper}",
+            0,
+            0,
+        )
         prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=progress)
 
 

@@ -10,6 +10,8 @@ from matplotlib.text import Text
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
+from spirillum.results.page import load_figures
+from spirillum.worker_pool import process_beside
 from synthetic_experiments import synthetic
 
 WIDE = "biorob2012-wide"
@@ -32,6 +34,17 @@ def drawn(found: Any) -> dict[str, Any]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)
         return {"observed": observed_figure(found, 0), "residuals": residual_figure(found)}
+
+
+def test_figures_do_not_depend_on_the_number_of_processes(found: Any, tmp_path: Path) -> None:
+    with process_beside(load_figures) as beside:
+        write_calibration(found, tmp_path / "two", beside=beside)
+    write_calibration(found, tmp_path / "one")
+    names = {path.name for path in (tmp_path / "one" / "figures").iterdir()}
+    assert names == {path.name for path in (tmp_path / "two" / "figures").iterdir()} != set()
+    for name in names:
+        one, two = ((tmp_path / folder / "figures" / name).read_bytes() for folder in ("one", "two"))
+        assert one == two, name
 
 
 def _texts(figure: Any) -> str:

@@ -21,11 +21,13 @@ def calibration(answer: Answer) -> Blocks:
     for name, item in answer["parameters"].items():
         _add(rows, name, item)
     for name, item in answer["discrepancy"].items():
-        _add(rows, f"discrepancy of the {name.replace('_', ' ')}", item)
+        _add(rows, f"model discrepancy, {CALLED[name]}", item)
     for name, item in answer["error_of_a_trial"].items():
         if item["value"] is not None:
-            _add(rows, f"error of a trial, {name.replace('_', ' ')}", item)
+            _add(rows, f"error of a trial, {CALLED[name]}", item)
     yield rows
+    if answer["discrepancy"]:
+        yield "model discrepancy: by how much the model misses the mean of a tail, as a standard deviation"
     yield from _friction(answer)
     if answer["method"] != "paper":
         yield Detail("low and high: 95 % interval")
@@ -42,7 +44,7 @@ def _synthetic(answer: Answer) -> str:
 
 
 def _add(rows: Table, name: str, item: Answer) -> None:
-    share = name.startswith(("discrepancy", "error"))
+    share = name.startswith(("model discrepancy", "error"))
     unit = "%" if share else display_unit(item["value"], item["unit"])
     numbers = []
     for key in ("value", "low", "high"):

@@ -38,6 +38,7 @@ from spirillum.fluid.tube.film_surface import TOUCHES, Cuts, FilmBody, FilmSurfa
 from spirillum.kernels import core
 from spirillum.kernels import tube_table as table
 from spirillum.robot.outline import Outline
+from spirillum.units import show
 
 _EXTRA = 3
 """Gauss points of an element beyond its polynomials' degree."""
@@ -277,10 +278,12 @@ def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: in
     a, reach = body.radius, max(-body.rear[0], body.front[0])
     length = body.front[0] - body.rear[0]
     if not radius > a:
-        raise InputError("the body does not fit into the tube")
+        sizes = f"body.diameter = {show(2.0 * a, 'mm')} and channel.diameter = {show(2.0 * radius, 'mm')}"
+        raise InputError(f"{sizes}: the body does not fit into the tube; allowed: a wider channel")
     if not body.half and length < _SHORTEST * a:
         raise InputError(
-            f"lubrication films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius"
+            f"the body's straight side of {show(length, 'mm')} is too short for a table of its lubrication film; "
+            f"allowed: at least {_SHORTEST:g} of its radius (body.length, body.profile), or single poses"
         )
     head = np.zeros(core.FILM_SIZE)
     head[:7] = radius, a, body.half, *body.rear, *body.front
