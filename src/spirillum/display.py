@@ -57,6 +57,11 @@ def counted(number: int, word: str) -> str:
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
+def label_of_model(name: str) -> str:
+    """A model's name in text: abbreviations in capitals."""
+    return name.upper() if len(name) <= 3 else name
+
+
 def percent(share: float) -> str:
     """A share in per cent, with two significant digits and no exponent up to 1e5."""
     value = 100.0 * share

@@ -6,18 +6,17 @@ its name in `spirillum.studies.spec.Study.claims`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from spirillum.papers.biorob2012.claims_predicted import claims_of_study, predictions_of_study
-from spirillum.papers.biorob2012.figures import PAPER_FIGURES, more_figures
 from spirillum.papers.claim import Claim
-from spirillum.view.figures.sheet import Picture
-from spirillum.view.figures.study import study_figures
-from spirillum.view.figures.study_panels import PaperFigure
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from spirillum.view.figures.sheet import Picture
 
 
 class Paper(NamedTuple):
@@ -25,11 +24,10 @@ class Paper(NamedTuple):
 
     claims: Callable[[xr.Dataset], list[Claim]]  #: Its statements, each with its verdict.
     predictions: Callable[[xr.Dataset], list[Claim]]  #: Its statements with verdicts from released robots.
-    layout: Mapping[str, PaperFigure]
-    figures: Callable[[xr.Dataset], dict[str, Picture]]
+    figures: str  #: Module with `PAPER_FIGURES`, the layout of its channels' figures, and `more_figures`.
 
 
-_PAPERS = {"biorob2012": Paper(claims_of_study, predictions_of_study, PAPER_FIGURES, more_figures)}
+_PAPERS = {"biorob2012": Paper(claims_of_study, predictions_of_study, "spirillum.papers.biorob2012.figures")}
 
 
 def _paper_of(dataset: xr.Dataset) -> Paper | None:
@@ -50,7 +48,10 @@ def predictions_of(dataset: xr.Dataset) -> list[Claim]:
 
 def figures_of(dataset: xr.Dataset) -> dict[str, Picture]:
     """Figures of a study by file name, in the layout of the paper that it names, and that paper's own."""
+    from spirillum.view.figures.study import study_figures
+
     paper = _paper_of(dataset)
     if paper is None:
         return study_figures(dataset)
-    return {**study_figures(dataset, paper.layout), **paper.figures(dataset)}
+    own = import_module(paper.figures)
+    return {**study_figures(dataset, own.PAPER_FIGURES), **own.more_figures(dataset)}

@@ -35,18 +35,19 @@ from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit
 from spirillum.studies.run import computed_study, make_tables, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
 from spirillum.studies.study_loader import LARGEST_STUDY, load_study, observed_arrays
-from spirillum.view.figures.comparison import ranking_picture
-from spirillum.view.figures.release import release_picture
-from spirillum.view.figures.robot import robot_figure, robot_words
-from spirillum.view.figures.sheet import Picture
 from spirillum.worker_pool import pool_of_workers, process_beside
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
+    from spirillum.view.figures.sheet import Picture
+
 
 def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
     """Side view of the study's fastest robot, else of its first; None if the dataset carries no settings of robots."""
+    from spirillum.view.figures.robot import robot_figure, robot_words
+    from spirillum.view.figures.sheet import Picture
+
     dumps = json.loads(dataset.attrs.get("settings", "{}")).get("robots") or []
     if not dumps:
         return None
@@ -85,6 +86,9 @@ _LARGEST_SVG = 2_000_000  # a larger vector picture is embedded as pixels, bytes
 
 def study_pictures(dataset: xr.Dataset) -> dict[str, Picture]:
     """The figures of a study by the names of their files."""
+    from spirillum.view.figures.comparison import ranking_picture
+    from spirillum.view.figures.release import release_picture
+
     ranking = ranking_of(dataset)
     first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
     drawn = {"robot": robot_picture(dataset, ranking), "laid-down": release_picture(dataset, ranking)}
@@ -265,7 +269,12 @@ def study(  # noqa: PLR0913 - the options of the command
 
 
 def _load() -> None:
-    """Import this module and what drawing takes, in a process that draws beside this one."""
+    """Import what drawing takes, in a process that draws beside this one."""
+    import spirillum.papers.biorob2012.figures
+    import spirillum.view.figures.comparison
+    import spirillum.view.figures.release
+    import spirillum.view.figures.robot  # noqa: F401
+
     load_figures()
 
 

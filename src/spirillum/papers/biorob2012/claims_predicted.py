@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Values
+from spirillum.display import label_of_model as label
 from spirillum.fluid.closed.sbt import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
 from spirillum.papers.biorob2012 import claims_swimming
 from spirillum.papers.biorob2012.evidence import (
@@ -29,7 +30,6 @@ from spirillum.papers.claim import Claim, PredictedVerdict, Verdict
 from spirillum.robot.load import load
 from spirillum.studies.released_robots import INFERRED_BY
 from spirillum.units import Hz
-from spirillum.view.figures.style import label_of_model as label
 
 if TYPE_CHECKING:
     import xarray as xr

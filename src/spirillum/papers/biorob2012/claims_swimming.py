@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Values
+from spirillum.display import label_of_model as label
 from spirillum.papers.biorob2012.evidence import (
     BODY_ROTATION_ERROR,
     GLOBAL_DROP,
@@ -22,7 +23,6 @@ from spirillum.papers.biorob2012.evidence import (
 from spirillum.papers.biorob2012.published import VELOCITY_DROPS
 from spirillum.papers.claim import Claim, Verdict
 from spirillum.units import Hz
-from spirillum.view.figures.style import label_of_model as label
 
 _EQUAL_RATES = (
     "the paper observed equal motor rates in both channels; with them a tail's loss follows without knowing the rate"

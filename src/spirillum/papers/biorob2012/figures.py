@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
+from spirillum.display import label_of_model
 from spirillum.papers.biorob2012.evidence import GLOBAL_DROP, LARGEST_REYNOLDS, Evidence
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
 from spirillum.view.figures.study import PANEL
 from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
-from spirillum.view.figures.style import UnitPrefix, label_of_model, look_of_model
+from spirillum.view.figures.style import UnitPrefix, look_of_model
 
 if TYPE_CHECKING:
     import xarray as xr

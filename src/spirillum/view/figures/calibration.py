@@ -15,22 +15,12 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.calibration.least_squares import FEWEST_LEFT
-from spirillum.display import percent
+from spirillum.display import label_of_model, percent
 from spirillum.units import Hz
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_panels import spread
-from spirillum.view.figures.style import (
-    COLOURS,
-    PAGE,
-    PATCH,
-    UnitPrefix,
-    in_words,
-    label_of_model,
-    look_of_model,
-    plain,
-    styled,
-)
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, in_words, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated

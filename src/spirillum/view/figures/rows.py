@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
+from spirillum.display import label_of_model
 from spirillum.units import Hz
 from spirillum.view.figures.study_panels import StudyView, spread
-from spirillum.view.figures.style import COLOURS, PATCH, Look, UnitPrefix, label_of_model, look_of_model
+from spirillum.view.figures.style import COLOURS, PATCH, Look, UnitPrefix, look_of_model
 
 MOST_CURVES = 6  #: Amplitudes with a curve of their own against the assumed motor rate, for one or two models.
 FEW_CURVES = 2  #: Amplitudes with a curve of their own, for more than two models.

@@ -79,11 +79,6 @@ def look_of_model(name: str) -> Look:
     return _LOOKS.get(name, _OTHER)
 
 
-def label_of_model(name: str) -> str:
-    """A model's name in text: abbreviations in capitals."""
-    return name.upper() if len(name) <= 3 else name
-
-
 @dataclass(frozen=True)
 class UnitPrefix:
     """A unit with a prefix that makes a set of values readable."""
