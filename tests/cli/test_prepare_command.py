@@ -107,7 +107,7 @@ def test_what_an_interrupted_preparation_has_kept_is_announced(monkeypatch: pyte
     assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min on 2 free cores" in said
     monkeypatch.setattr(progress_messages, "slowdown", lambda _: 3.0)
     busy = progress_message(60, 2, 48, (10.0, 17.0))
-    assert busy.endswith("in 60 s to 2 min on 2 free cores, 3 to 5 min beside this machine's other work")
+    assert busy.endswith("in 60 s to 2 min on 2 free cores, up to 5 min beside this machine's other work")
 
 
 def test_the_slowdown_is_that_of_threads_that_share_a_core(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ TILTED = "a pitched or yawed pose without a table: the flow is solved for"
 LEVEL = "no table of this tube: the flow is solved for"
 OF_A_RUN = "the flow at a moment of a run: it is solved for"
 """How messages begin that are to be read, too; the second only where the answer is not there at once."""
-SOLUTION = {LEVEL: (5.0, 20.0), TILTED: (10.0, 40.0), OF_A_RUN: (60.0, 180.0)}
+SOLUTION = {LEVEL: (3.0, 15.0), TILTED: (10.0, 40.0), OF_A_RUN: (60.0, 180.0)}
 """What a fast and a slow core need for each, s."""
 
 
@@ -32,17 +32,16 @@ def _rounded(seconds: float) -> tuple[int, str]:
 def time_on_free_cores(seconds: tuple[float, float], workers: int = 1) -> str:
     """Return how long work takes on free cores, in words, from what a fast and a slow core need for all of it."""
     cores = f"{workers} free cores" if workers > 1 else "a free core"
-    return f"{_shared(seconds, workers)} on {cores}"
+    return f"{time_span(seconds[0] / workers, seconds[1] / workers)} on {cores}"
 
 
 def time_now(seconds: tuple[float, float], workers: int = 1) -> str:
     """Return `time_on_free_cores` and, where other work slows this machine down, how long it takes beside that."""
     free, times = time_on_free_cores(seconds, workers), slowdown(workers)
-    return free if times < _BUSY else f"{free}, {_shared(seconds, workers / times)} beside this machine's other work"
-
-
-def _shared(seconds: tuple[float, float], cores: float) -> str:
-    return time_span(seconds[0] / cores, seconds[1] / cores)
+    if times < _BUSY:
+        return free
+    most, unit = _rounded(seconds[1] * times / workers)
+    return f"{free}, up to {most} {unit} beside this machine's other work"
 
 
 def solution_message(begin: str) -> str:
