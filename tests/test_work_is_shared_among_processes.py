@@ -1,6 +1,7 @@
 """Work shared out among processes: every answer once, beside its task, and no copy of the caller's script."""
 
 import math
+import os
 import signal
 import subprocess
 import sys
@@ -10,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from spirillum.worker_pool import imap_unordered
+from spirillum import worker_pool
+from spirillum.worker_pool import imap_unordered, slowdown
 
 
 def test_answers_of_several_processes_are_those_of_one() -> None:
@@ -61,3 +63,20 @@ def _runs(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def test_the_slowdown_is_that_of_threads_that_share_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thread that has half of a core takes twice as long."""
+    clock = iter([0.0, 0.0, 0.06, 0.06] * 9)
+    monkeypatch.setattr(worker_pool, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(worker_pool, "thread_time", iter([0.0, 0.03, 0.0, 0.06]).__next__)
+    assert slowdown(1) == pytest.approx(2.0)
+    assert slowdown(1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_process_beside_needs_a_free_core(monkeypatch: pytest.MonkeyPatch, busy: bool) -> None:
+    monkeypatch.setattr(worker_pool, "slowdown", lambda _: 4.0 if busy else 1.0)
+    with worker_pool.process_beside(os.getpid) as beside:
+        assert (beside is None) is busy
+        assert beside is None or beside.submit(os.getpid).result() != os.getpid()

@@ -13,15 +13,17 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from hashlib import sha256
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
+from statistics import fmean
 from threading import Lock, Thread
-from time import monotonic
+from time import monotonic, perf_counter, thread_time
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
@@ -78,8 +80,14 @@ def imap_unordered(
 
 
 @contextmanager
-def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor]:
-    """A process beside this one that runs `start`, such as imports, at once; it ends with the block."""
+def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor | None]:
+    """A process beside this one that runs `start`, such as imports, at once; it ends with the block.
+
+    None where other work leaves no core for it: its imports would take longer than what it does.
+    """
+    if slowdown(2) > BUSY:
+        yield None
+        return
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_begin, initargs=(True,))
     before = set(multiprocessing.active_children())
     try:
@@ -90,6 +98,24 @@ def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor]
         for process in set(multiprocessing.active_children()) - before:
             process.terminate()
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+BUSY = 1.5  #: Slowdown by other work from which on a machine counts as busy.
+_MOMENT = 0.05  # time for which the slowdown is measured, s
+_BLOCK = bytes(1 << 20)
+
+
+def slowdown(workers: int) -> float:
+    """Measure for a moment how many times longer so many threads take for their work now than on free cores."""
+    with ThreadPoolExecutor(workers) as pool:
+        return fmean(pool.map(_slowdown_of_thread, range(workers)))
+
+
+def _slowdown_of_thread(_: int) -> float:
+    wall, own = perf_counter(), thread_time()
+    while perf_counter() - wall < _MOMENT:
+        sha256(_BLOCK)  # without the lock of the interpreter
+    return max((perf_counter() - wall) / max(thread_time() - own, 1e-3), 1.0)
 
 
 def memory_in_use() -> float:

@@ -41,7 +41,10 @@ def test_interval_of_each_tail_holds_its_own_mean(wrong: Any) -> None:
         assert np.count_nonzero(inside) >= seen.size - 1
 
 
-def test_draws_do_not_depend_on_the_number_of_processes(made: Callable[..., Path]) -> None:
+def test_draws_do_not_depend_on_the_number_of_processes(
+    made: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spirillum.worker_pool.slowdown", lambda _: 1.0)
     path = made(presets=(WIDE,))
     few = Sampling(ensembles=3, walkers=24, warm_up=5, steps=20, doublings=1)
     alone, shared = (sp.calibrate(path, WIDE, sampling=few, model="sbt", workers=count) for count in (1, 2))

@@ -11,7 +11,7 @@ import spirillum as sp
 from spirillum.cli.renderer import progress_bar
 from spirillum.fluid.tube import progress_messages
 from spirillum.fluid.tube.outer_resistance import NodeSolution, _mixed
-from spirillum.fluid.tube.progress_messages import progress_message, slowdown, time_now
+from spirillum.fluid.tube.progress_messages import progress_message
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
@@ -108,15 +108,6 @@ def test_what_an_interrupted_preparation_has_kept_is_announced(monkeypatch: pyte
     monkeypatch.setattr(progress_messages, "slowdown", lambda _: 3.0)
     busy = progress_message(60, 2, 48, (10.0, 17.0))
     assert busy.endswith("in 60 s to 2 min on 2 free cores, up to 5 min beside this machine's other work")
-
-
-def test_the_slowdown_is_that_of_threads_that_share_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A thread that has half of a core takes twice as long, and is told so."""
-    clock = iter([0.0, 0.0, 0.06, 0.06] * 9)
-    monkeypatch.setattr(progress_messages, "perf_counter", lambda: next(clock))
-    monkeypatch.setattr(progress_messages, "thread_time", iter([0.0, 0.03, 0.0, 0.06]).__next__)
-    assert slowdown(1) == pytest.approx(2.0)
-    assert time_now((20.0, 40.0)) == "20 to 40 s on a free core"
 
 
 def test_the_time_left_does_not_jump_between_cheap_and_expensive_poses() -> None:

@@ -36,7 +36,10 @@ def drawn(found: Any) -> dict[str, Any]:
         return {"observed": observed_figure(found, 0), "residuals": residual_figure(found)}
 
 
-def test_figures_do_not_depend_on_the_number_of_processes(found: Any, tmp_path: Path) -> None:
+def test_figures_do_not_depend_on_the_number_of_processes(
+    found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spirillum.worker_pool.slowdown", lambda _: 1.0)
     with process_beside(load_figures) as beside:
         write_calibration(found, tmp_path / "two", beside=beside)
     write_calibration(found, tmp_path / "one")

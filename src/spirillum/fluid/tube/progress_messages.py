@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-from hashlib import sha256
-from statistics import fmean
-from time import perf_counter, thread_time
+from spirillum.worker_pool import BUSY, slowdown
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
@@ -38,7 +35,7 @@ def time_on_free_cores(seconds: tuple[float, float], workers: int = 1) -> str:
 def time_now(seconds: tuple[float, float], workers: int = 1) -> str:
     """Return `time_on_free_cores` and, where other work slows this machine down, how long it takes beside that."""
     free, times = time_on_free_cores(seconds, workers), slowdown(workers)
-    if times < _BUSY:
+    if times < BUSY:
         return free
     most, unit = _rounded(seconds[1] * times / workers)
     return f"{free}, up to {most} {unit} beside this machine's other work"
@@ -55,25 +52,6 @@ def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, 
     before = f", {kept} of them saved before, {remaining} remaining" if kept else ""
     takes = time_now((remaining * seconds[0], remaining * seconds[1]), max(workers, 1))
     return f"{ANNOUNCED}: it is computed once from {poses} poses{before}, in {takes}"
-
-
-_BUSY = 1.5
-"""Slowdown by other work from which on it is named."""
-_MOMENT = 0.05  # time for which the slowdown is measured, s
-_BLOCK = bytes(1 << 20)
-
-
-def slowdown(workers: int) -> float:
-    """Measure for a moment how many times longer threads take that work now than on free cores."""
-    with ThreadPoolExecutor(workers) as pool:
-        return fmean(pool.map(_slowdown_of_thread, range(workers)))
-
-
-def _slowdown_of_thread(_: int) -> float:
-    wall, own = perf_counter(), thread_time()
-    while perf_counter() - wall < _MOMENT:
-        sha256(_BLOCK)  # without the lock of the interpreter
-    return max((perf_counter() - wall) / max(thread_time() - own, 1e-3), 1.0)
 
 
 def kept_after(poses: int, kept: int) -> str:
