@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -98,21 +98,35 @@ class Trajectory:
 
 
 @dataclass
-class _Run:
-    """A run while it is computed."""
+class Steps:
+    """A motion step by step: its state, and what the integrator keeps of the last step, see `stiff_steps`."""
 
-    robot: FreeRobot
-    reach: Reach
     state: Samples
     memory: Samples
     gaps: Samples
-    before: Samples
-    increments: Samples = field(default_factory=lambda: np.zeros((8, core.STATE_SIZE)))
-    jacobian: Samples = field(default_factory=lambda: np.zeros((8, 8)))
+    before: Samples  #: The state at the beginning of the last step.
+    increments: Samples
+    jacobian: Samples
+
+    @classmethod
+    def of(cls, robot: FreeRobot, state: Samples, time: float, step: float) -> Steps:
+        """From a state at a time, s, by a first step of that length, s."""
+        memory = np.zeros(core.MEMORY_SIZE)
+        memory[[core.MEMORY_TIME, core.MEMORY_LAST_TIME]] = time
+        memory[[core.MEMORY_STEP, core.MEMORY_LAST_STEP]] = step
+        gaps = np.ones(robot.gap_count + core.WATCHED)
+        return cls(state, memory, gaps, state.copy(), np.zeros((8, core.STATE_SIZE)), np.zeros((8, 8)))
 
     @property
     def time(self) -> float:
+        """Where it is now, s."""
         return float(self.memory[core.MEMORY_TIME])
+
+    @property
+    def last(self) -> Checkpoint:
+        """The beginning of the last step."""
+        time, step = self.memory[[core.MEMORY_LAST_TIME, core.MEMORY_LAST_STEP]].tolist()
+        return Checkpoint(time, step, tuple(self.before.tolist()))
 
 
 def integrate(
@@ -130,23 +144,18 @@ def integrate(
     """
     end = float(time[-1])
     going_on = isinstance(start, Checkpoint)
-    state = np.array(start.state if isinstance(start, Checkpoint) else start, dtype=float)
-    memory = np.zeros(core.MEMORY_SIZE)
-    memory[core.MEMORY_TIME] = start.time if isinstance(start, Checkpoint) else time[0]
-    memory[core.MEMORY_STEP] = start.step if isinstance(start, Checkpoint) else first_step(robot)
-    memory[core.MEMORY_LAST_TIME], memory[core.MEMORY_LAST_STEP] = memory[core.MEMORY_TIME], memory[core.MEMORY_STEP]
-    run = _Run(robot, reach, state, memory, np.ones(robot.gap_count + core.WATCHED), state.copy())
+    begun = start if isinstance(start, Checkpoint) else Checkpoint(float(time[0]), first_step(robot), tuple(start))
+    run = Steps.of(robot, np.array(begun.state, dtype=float), begun.time, begun.step)
     pieces: list[tuple[Samples, Samples, float]] = []
     events: list[Event] = []
-    first = run.time
 
     def tell(moment: float) -> None:
         if progress is not None:
-            progress("motion", int(1000 * (min(moment, end) - first) / (end - first)), 1000)
+            progress("motion", int(1000 * (min(moment, end) - begun.time) / (end - begun.time)), 1000)
 
     spent = False
     if not going_on:
-        pieces.append((time[:1], state[None].copy(), _duty(switches, float(time[0]))))
+        pieces.append((time[:1], run.state[None].copy(), _duty(switches, float(time[0]))))
     after = time[1:] if not going_on else time[time > time[0]]
     stops = sorted({s.time for s in switches} | set(robot.bends.tolist()))
     while run.time < end:
@@ -155,14 +164,24 @@ def integrate(
         stop = stops[later] if later < len(stops) else np.inf
         inside = after[(after > run.time) & (after <= stop)] if not going_on else after[after <= stop]
         going_on = False
-        stretch = _stretch(run, duty, stop, end, inside, spent=spent, tell=tell)
-        events += stretch.events
-        pieces.append((stretch.times, stretch.states, duty))
-        if stretch.what == BATTERY_EMPTY:
+        limits = watched_limits(robot, reach, spent=spent)
+        here = robot.at_duty(duty).between(run.time, stop)
+        times, states, what = _stretch(here, run, limits, inside, stop, end, events, tell)
+        pieces.append((times, states, duty))
+        if what == BATTERY_EMPTY:
             spent = True
-        elif stretch.what:
+        elif what:
             break
-    return _joined(robot, pieces, events, switches, run)
+    observed = [
+        robot.at_duty(duty).between(float(times[0]), float(times[-1])).observe(times, states)
+        for times, states, duty in pieces
+        if times.size
+    ]
+    times, states = (np.concatenate([piece[place] for piece in pieces]) for place in (0, 1))
+    duties = np.concatenate([np.full(inside.size, duty) for inside, _, duty in pieces])
+    switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if times[0] <= s.time <= times[-1]]
+    happened = tuple(sorted([*switched, *events], key=lambda event: event.time))
+    return Trajectory(times, duties, states, np.concatenate(observed), happened, run.last)
 
 
 def first_step(robot: FreeRobot) -> float:
@@ -186,40 +205,35 @@ def _duty(switches: Sequence[Switch], time: float) -> float:
     return switches[bisect_right(switches, time, key=lambda switch: switch.time) - 1].duty
 
 
-class _Stretch(NamedTuple):
-    """A run between two switchings."""
-
-    times: Samples
-    states: Samples
-    events: list[Event]
-    what: str
-    """What ended it early, or nothing."""
-
-
 def _stretch(
-    run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Callable[[float], None]
-) -> _Stretch:
-    robot = run.robot.at_duty(duty).between(run.time, stop)
-    data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
+    robot: FreeRobot,
+    run: Steps,
+    limits: Samples,
+    inside: Samples,
+    stop: float,
+    end: float,
+    events: list[Event],
+    tell: Callable[[float], None],
+) -> tuple[Samples, Samples, str]:
+    """A run between two switchings: its moments, its states, and what ended it early, or nothing."""
+    data = robot.data
     outside = float(observed_at(robot, run.state)[core.SEEN_OUTSIDE]) if robot.table.size else 0.0
     core.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, core.STATE_SIZE))
     sizes, done = run_sizes(robot), 0
-    events: list[Event] = []
-    clip = stop <= end
     target, what = min(stop, end), ""
     try:
         while True:
             watched = run.gaps.copy()
             status = core.advance(
-                target, clip, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments,
+                target, stop <= end, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments,
                 run.jacobian, run.gaps, inside[done:], states[done:], sizes, limits, robot.roughness, data,
                 robot.table,
             )  # fmt: skip
             done += int(run.memory[core.MEMORY_ANSWERED])
             tell(run.time)
             if status == core.CROSSED:
-                what = _crossed(run, robot, data, limits, watched, min(end, target), events)
+                what = _crossed(robot, run, data, limits, watched, target, events)
                 if what:
                     done = int(np.count_nonzero(inside[:done] <= run.time))
                     break
@@ -235,14 +249,14 @@ def _stretch(
     times, states = inside[:done], states[:done]
     if what and what != BATTERY_EMPTY and not (times.size and times[-1] == run.time):
         times, states = np.append(times, run.time), np.concatenate([states, run.state[None]])
-    return _Stretch(times, states, events, what)
+    return times, states, what
 
 
 def _crossed(
-    run: _Run, robot: FreeRobot, data: Samples, limits: Samples, watched: Samples, end: float, events: list[Event]
+    robot: FreeRobot, run: Steps, data: Samples, limits: Samples, watched: Samples, end: float, events: list[Event]
 ) -> str:
     """Note what happened in the last step; what ends the stretch, with the state where it does, or nothing."""
-    begin = float(run.memory[core.MEMORY_LAST_TIME])
+    begin, step, _ = run.last
     length = run.time - begin
     new, inner, gaps = run.state.copy(), np.empty(core.STATE_SIZE), np.empty_like(run.gaps)
     dy = np.empty(core.STATE_SIZE)
@@ -275,7 +289,7 @@ def _crossed(
             what = robot.range_left(inner, moment)
         run.state[:] = inner
         run.memory[core.MEMORY_TIME] = moment
-        run.memory[core.MEMORY_STEP] = run.memory[core.MEMORY_LAST_STEP]
+        run.memory[core.MEMORY_STEP] = step
         events.append(Event(moment, what))
         return what
     return ""
@@ -302,26 +316,3 @@ def watched_limits(robot: FreeRobot, reach: Reach, *, spent: bool = False) -> Sa
     motor = robot.drive[core.DRIVE_KIND] == core.MOTOR
     found[core.LIMITS_MOST_CHARGE] = reach.charge if motor and not spent else np.inf
     return found
-
-
-def _joined(
-    robot: FreeRobot,
-    pieces: Sequence[tuple[Samples, Samples, float]],
-    events: list[Event],
-    switches: Sequence[Switch],
-    run: _Run,
-) -> Trajectory:
-    times = np.concatenate([piece[0] for piece in pieces])
-    states = np.concatenate([piece[1] for piece in pieces])
-    duties = np.concatenate([np.full(piece[0].size, piece[2]) for piece in pieces])
-    observed = []
-    for time, inside, duty in pieces:
-        if time.size:
-            here = robot.at_duty(duty).between(float(time[0]), float(time[-1]))
-            observed.append(here.observe(time, inside))
-    switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if times[0] <= s.time <= times[-1]]
-    happened = tuple(sorted([*switched, *events], key=lambda event: event.time))
-    last = Checkpoint(
-        float(run.memory[core.MEMORY_LAST_TIME]), float(run.memory[core.MEMORY_LAST_STEP]), tuple(run.before.tolist())
-    )
-    return Trajectory(times, duties, states, np.concatenate(observed), happened, last)

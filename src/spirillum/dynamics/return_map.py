@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Reach, observed_at, watched_limits
+from spirillum.dynamics.integration import Reach, Steps, observed_at, watched_limits
 from spirillum.dynamics.start import state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
@@ -100,29 +100,24 @@ class ReturnMap:
         limits, sizes = watched_limits(robot, Reach()), robot.step_sizes()
         y = state.copy()
         y[_COUNTED] = 0.0
-        memory = np.zeros(core.MEMORY_SIZE)
-        memory[core.MEMORY_STEP] = _FIRST * robot.turn
-        gaps = np.ones(robot.gap_count + core.WATCHED)
-        increments, before, jacobian = np.zeros((8, core.STATE_SIZE)), y.copy(), np.zeros((8, 8))
-        core.watched(y, 0.0, data, robot.table, limits, robot.roughness, gaps)
+        run = Steps.of(robot, y, 0.0, _FIRST * robot.turn)
+        core.watched(y, 0.0, data, robot.table, limits, robot.roughness, run.gaps)
         nothing, none = np.empty(0), np.empty((0, core.STATE_SIZE))
         begun = observed_at(robot, y)[core.SEEN_TURN], y[core.STATE_PHASE]
         noted: list[tuple[float, ...]] = []
         jacobians: list[Samples] = []
         while self._turned(y, data[core.SEEN_TURN], begun) < 2.0 * np.pi or not noted:
             status = core.advance(
-                np.inf, _ON, 1, self.tolerance, memory, y, before, increments, jacobian, gaps, nothing, none,
-                sizes, limits, robot.roughness, data, robot.table,
+                np.inf, _ON, 1, self.tolerance, run.memory, y, run.before, run.increments, run.jacobian, run.gaps,
+                nothing, none, sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
-            time = float(memory[core.MEMORY_TIME])
             self.steps[0] += 1
-            if words := self._ended(status, y, time, gaps):
-                raise EndedTurnError(words, _part(before, noted, jacobians))
-            noted.append(_noted(time, y, data))
-            jacobians.append(jacobian.copy())
-        end, share = self._at_the_angle(before, y, increments, begun)
-        last = float(memory[core.MEMORY_LAST_TIME])
-        time = last + share * (float(memory[core.MEMORY_TIME]) - last)
+            if words := self._ended(status, y, run.time, run.gaps):
+                raise EndedTurnError(words, _part(run.before, noted, jacobians))
+            noted.append(_noted(run.time, y, data))
+            jacobians.append(run.jacobian.copy())
+        end, share = self._at_the_angle(run.before, y, run.increments, begun)
+        time = run.last.time + share * (run.time - run.last.time)
         steps = np.array(noted)
         tangent = _tangent(np.array([0.0, *steps[:-1, 0], time]), np.array(jacobians))
         return Turn(end, time, steps[steps[:, 0] <= time], tangent)
