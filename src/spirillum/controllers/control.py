@@ -33,7 +33,6 @@ from spirillum.controllers.task import (
     scored,
 )
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.run_summary import vertical_drift
@@ -42,6 +41,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_memory, check_range, did_you_mean
 from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
+from spirillum.progress import Progress, tell
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
@@ -309,8 +309,7 @@ def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None
     try:
         for _job, outcome in imap_unordered(outcome_of, jobs, workers):
             outcomes.append(outcome)
-            if progress is not None:
-                progress("scored runs", len(outcomes), len(jobs))
+            tell(progress, "scored runs", len(outcomes), len(jobs))
     except KeyboardInterrupt:
         pass
     cut_short = [Note.named("scores-cut-short", done=len(outcomes), all=len(jobs))]

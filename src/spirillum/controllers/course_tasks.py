@@ -28,9 +28,9 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import Controller, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.errors import InputError
+from spirillum.progress import Progress, tell
 from spirillum.robot.arguments import refusal
 from spirillum.robot.fields import Length, Velocity
 from spirillum.units import show
@@ -274,8 +274,7 @@ def _mean_speed(plant: Plant, duty: float, duration: float, progress: Progress |
     start = float(moment.pose.position[0])
     for number in range(count):
         moment = uninterrupted(other.step(duration / count, duty=duty))
-        if progress is not None:
-            progress("robot as its file says", number + 1, count)
+        tell(progress, "robot as its file says", number + 1, count)
         if moment.ended:
             raise InputError(
                 f"task.duration = {duration:g} s: {moment.ended} after {moment.time:.4g} s; allowed: a shorter time"

@@ -27,9 +27,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab, Unknown
 from spirillum.controllers.sensors import Controller, Detection, Message, SampledErrors, plant_of
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, Snapshot, uninterrupted
 from spirillum.errors import InputError
+from spirillum.progress import Progress, tell
 from spirillum.robot.robot import Robot
 
 _POINTS = 5
@@ -84,8 +84,7 @@ class Bank:
         self._plants: list[Plant] = []
         for member in members:
             self._plants.append(plant_of(robot, arguments or {}, member))
-            if progress is not None:
-                progress("bank of robots", len(self._plants), len(members))
+            tell(progress, "bank of robots", len(self._plants), len(members))
         self._time = [0.0]
         self._rows = [[_quantities(plant.observe()) for plant in self._plants]]
 

@@ -19,9 +19,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import Command, Controller, Detection, FlowPulse, Message, MeterReading, Senses
-from spirillum.dynamics.integration import INTERRUPTED, Progress
+from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.errors import InputError
+from spirillum.progress import Progress
 
 SILENCE = 1.0  #: The drive is off so long after the last frame has arrived, s.
 _LEAST_PATIENCE = 0.5 * SILENCE

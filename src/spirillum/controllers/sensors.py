@@ -14,10 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from spirillum.controllers.lab import Lab, Pulse, Unknown
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.dynamics.rotating_field import Field
 from spirillum.errors import InputError
+from spirillum.progress import Progress
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of

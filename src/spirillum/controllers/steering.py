@@ -34,10 +34,10 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun, run_loop
 from spirillum.controllers.sensors import Command, Controller, Detection, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.dynamics.rotating_field import Field
 from spirillum.errors import InputError
+from spirillum.progress import Progress
 from spirillum.robot.arguments import one_of
 from spirillum.robot.fields import Length, Rate
 from spirillum.units import show

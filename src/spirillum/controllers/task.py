@@ -18,9 +18,9 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import Learner, Learning
 from spirillum.controllers.loop import LoopRun, run_loop
 from spirillum.controllers.sensors import Controller, FlowPulse, SampledErrors, Senses, draw, plant_of
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.envelope import quantity
+from spirillum.progress import Progress
 from spirillum.robot.arguments import Options, within
 from spirillum.robot.fields import Time
 from spirillum.robot.robot import Robot

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,7 @@ from spirillum.fluid.algebra import two_parts_axial
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.fluid.wire.slender import Slender
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
@@ -247,7 +248,7 @@ def compare_models(
     calibration: str | Path | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> ModelComparison:
     """Predict the steady swimming of one robot with several models; floats are in SI units, rates in rad/s.
 
@@ -300,8 +301,7 @@ def compare_models(
     predictions: dict[str, Prediction] = {}
     refusals: dict[str, str] = {}
     for done, name in enumerate(names):
-        if progress is not None:
-            progress(f"model {name}", done, len(names))
+        tell(progress, f"model {name}", done, len(names))
         placed = pose if find_swimmer_model(name).placed and pose != Placement() else None
         try:
             held = predict(

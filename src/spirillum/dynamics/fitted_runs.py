@@ -14,7 +14,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_motion import FreeMotion, means_over, prepare_release
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
 from spirillum.dynamics.steady_state_search import STABLE
 from spirillum.errors import InputError
@@ -22,6 +21,7 @@ from spirillum.fitted.fit import CALIBRATED_HELD, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes, notes_in
+from spirillum.progress import Progress, tell
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
@@ -89,14 +89,14 @@ def with_intervals(
     robot: Robot,
     run: Callable[[Robot, int], xr.Dataset],
     draws: int,
-    tell: Callable[[str, int, int], None],
+    progress: Progress | None,
 ) -> xr.Dataset:
     """A run with 95 % intervals of its mean speed and rates, as scalars `..._low` and `..._high`."""
     rng = np.random.default_rng(1)
     found: dict[str, list[float]] = {f"mean_{name}{over}": [] for name in _FACTORS for over in _OVER}
     drawn, kept = posterior.drawn(robot, draws, rng), posterior.places(draws)
     for number, one in enumerate(drawn):
-        tell("draws of the posterior", number, len(drawn))
+        tell(progress, "draws of the posterior", number, len(drawn))
         answer = run(one, kept[number])
         for name, values in found.items():
             values.append(float(answer[name]))
@@ -165,8 +165,7 @@ def intervals_of_free_motion(
     swum: list[Swimming] = []
     steady = []
     for number, (index, one) in enumerate(zip(indices, posterior.drawn(unbound, DRAWS, rng), strict=True)):
-        if progress is not None:
-            progress("draws of the posterior", number, len(indices))
+        tell(progress, "draws of the posterior", number, len(indices))
         release = found.release.with_contact(posterior.contact(index))
         held, links = prepare_release(one, found.robot.table, release, found.prediction.tail_rate, reading)
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)

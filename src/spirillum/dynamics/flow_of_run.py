@@ -16,6 +16,7 @@ from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fluid.tube.progress_messages import OF_A_RUN, solution_message
 from spirillum.fluid.tube.tube import Tube
 from spirillum.notes import Note, note_attributes, notes_in
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import with_resolution
@@ -27,7 +28,7 @@ from spirillum.swimming.steady import STEADY, Swimming, friction_reading, requir
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     import xarray as xr
 
@@ -68,7 +69,7 @@ def flow_of_run(
     *,
     frame: str = "lab",
     resolution: Resolution | Mapping[str, Any] | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Flow:
     """The flow around a robot at a moment of a run by `simulate` with the model `tube`.
 
@@ -90,8 +91,7 @@ def flow_of_run(
     """
     check_choice("frame", frame, get_args(Frame))
     at = moment_of_run(run, time, resolution)
-    if progress is not None:
-        progress(solution_message(OF_A_RUN), 0, 1)
+    tell(progress, solution_message(OF_A_RUN), 0, 1)
     field = tube_flow_field(at.prediction.batch, at.body, at.rotor, at.phase, at.mean_flow)
     flow = Flow(at.prediction, field, at.phase, cast("Frame", frame), lifted=at.lifted)
     return replace(flow, held_force=float("nan")) if at.lifted > 0.0 else flow.with_held_force()

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Progress, Reach, integrate, observed_at
+from spirillum.dynamics.integration import Reach, integrate, observed_at
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.start import released_state
@@ -33,6 +33,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.kernels import core
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement

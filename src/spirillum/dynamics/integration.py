@@ -20,6 +20,7 @@ from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
 from spirillum.kernels import core
+from spirillum.progress import Progress, tell
 
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
@@ -31,8 +32,6 @@ INTERRUPTED = "interrupted"
 """The event of a run that was interrupted, which keeps what was done."""
 BATTERY_EMPTY = "battery empty"
 """Event after which the battery drives no longer."""
-
-Progress = Callable[[str, int, int], None]
 
 
 class Event(NamedTuple):
@@ -149,9 +148,8 @@ def integrate(
     pieces: list[tuple[Samples, Samples, float]] = []
     events: list[Event] = []
 
-    def tell(moment: float) -> None:
-        if progress is not None:
-            progress("motion", int(1000 * (min(moment, end) - begun.time) / (end - begun.time)), 1000)
+    def reached(moment: float) -> None:
+        tell(progress, "motion", int(1000 * (min(moment, end) - begun.time) / (end - begun.time)), 1000)
 
     spent = False
     if not going_on:
@@ -166,7 +164,7 @@ def integrate(
         going_on = False
         limits = watched_limits(robot, reach, spent=spent)
         here = robot.at_duty(duty).between(run.time, stop)
-        times, states, what = _stretch(here, run, limits, inside, stop, end, events, tell)
+        times, states, what = _stretch(here, run, limits, inside, stop, end, events, reached)
         pieces.append((times, states, duty))
         if what == BATTERY_EMPTY:
             spent = True
@@ -213,7 +211,7 @@ def _stretch(
     stop: float,
     end: float,
     events: list[Event],
-    tell: Callable[[float], None],
+    reached: Callable[[float], None],
 ) -> tuple[Samples, Samples, str]:
     """A run between two switchings: its moments, its states, and what ended it early, or nothing."""
     data = robot.data
@@ -231,7 +229,7 @@ def _stretch(
                 robot.table,
             )  # fmt: skip
             done += int(run.memory[core.MEMORY_ANSWERED])
-            tell(run.time)
+            reached(run.time)
             if status == core.CROSSED:
                 what = _crossed(robot, run, data, limits, watched, target, events)
                 if what:

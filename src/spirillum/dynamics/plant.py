@@ -18,15 +18,7 @@ import numpy as np
 from spirillum.argument_validation import as_number, check_kind, validate_arguments
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot, TwoLinks
-from spirillum.dynamics.integration import (
-    BATTERY_EMPTY,
-    INTERRUPTED,
-    Checkpoint,
-    Progress,
-    Reach,
-    Trajectory,
-    integrate,
-)
+from spirillum.dynamics.integration import BATTERY_EMPTY, INTERRUPTED, Checkpoint, Reach, Trajectory, integrate
 from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
@@ -46,6 +38,7 @@ from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement

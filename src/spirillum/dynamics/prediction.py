@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, FITTED_TRIAL, read_fit
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.progress import Progress
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
@@ -43,7 +44,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     duration: str | float | None = None,
     interval: bool = False,
     beyond_stokes: bool = False,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot; floats are in SI units, rates in rad/s.
 

@@ -10,7 +10,7 @@ in time that continues from the attitude of the one before, as when the field is
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
@@ -25,6 +25,7 @@ from spirillum.errors import InputError, check_range
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes
+from spirillum.progress import Progress, tell
 from spirillum.quantities import attributes
 from spirillum.robot.arguments import Options
 from spirillum.robot.batch import RobotBatch
@@ -172,7 +173,7 @@ def magnetic_sweep(
     model: str = AUTO,
     turns: float = 30.0,
     resolution: Resolution | Mapping[str, Any] | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Speed, lag and wobble of a one-piece swimmer against the field's rate; floats are in SI units, rates in rad/s.
 
@@ -232,8 +233,7 @@ def magnetic_sweep(
     attitude: Samples = level
     found, settled = [], []
     for done, rate in enumerate(requested):
-        if progress is not None:
-            progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, requested.size)
+        tell(progress, f"field at {rate / (2 * np.pi):.3g} Hz", done, requested.size)
         pushed = Rotation.from_rotvec([0.0, 0.0, _TILT]) * Rotation.from_quat(attitude, scalar_first=True)
         mean, still = _settled(links, float(rate), pushed.as_quat(scalar_first=True), turns)
         attitude = mean.state[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4] if mean.follows else level

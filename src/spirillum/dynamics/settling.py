@@ -21,7 +21,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.run_summary import state_of
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
@@ -32,6 +31,7 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.quantities import in_units
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot

@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.dynamics.axial_robot import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
-from spirillum.dynamics.integration import Progress, integrate
+from spirillum.dynamics.integration import integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
 from spirillum.dynamics.run_summary import vertical_drift
@@ -26,6 +26,7 @@ from spirillum.fluid.tube.library import TabledTube
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes, notes_in
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
@@ -163,14 +164,13 @@ def simulate(  # noqa: PLR0913 - the options of the command
         notes += fit.run_warnings(central, find_swimmer_model(model), reading)
     if known is not None and number:
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
-        tell = progress or (lambda _what, _done, _total: None)
         dataset = with_intervals(
             dataset,
             known,
             central,
             lambda one, draw: run(without_reynolds_bound(one), same_length, draw=draw),
             number,
-            tell,
+            progress,
         )
     more = {"model_reason": choice.reason} if choice.reason else {}
     more |= {f"field_{name}": angle for name, angle in about.model_dump(exclude_none=True).items()}

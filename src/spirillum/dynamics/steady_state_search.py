@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import core
+from spirillum.progress import Progress
 from spirillum.swimming.released_motion import State, SteadyState
 
 _MOST_TURNS = 300

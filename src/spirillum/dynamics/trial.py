@@ -30,6 +30,7 @@ from spirillum.fitted.fit import FITTED_BESIDE, NO_FIT, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
+from spirillum.progress import Progress, tell
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
@@ -226,7 +227,7 @@ def with_interval(
     samples: Sequence[TrialSample],
     unknowns: Sequence[TrialUnknown],
     run: Callable[[TrialSample], ReleasedMotion],
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
     discrepancy: Callable[[Sequence[TrialSample], Sequence[ReleasedMotion]], Mapping[str, Samples]] | None = None,
 ) -> ReleasedMotion:
     """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
@@ -240,8 +241,7 @@ def with_interval(
         try:
             for found in pool.map(run, samples):
                 runs.append(found)
-                if progress is not None:
-                    progress("trial over its unknowns", len(runs), len(samples))
+                tell(progress, "trial over its unknowns", len(runs), len(samples))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -326,9 +326,8 @@ class TrialRequest:
     duration: float | None
     """Of the trial, s; None: that of a run by its defaults."""
     interval: bool
-    progress: Callable[[str, int, int], None] | None
-    posterior_for: PosteriorFor = "new"
-    """Whose discrepancy the interval holds, with a posterior."""
+    progress: Progress | None
+    posterior_for: PosteriorFor = "new"  #: Whose discrepancy the interval holds, with a posterior.
 
     def check(self, model: str, tail_rate: str | float | None, *, wanted: bool) -> None:
         """Refuse what no trial can have, before the held answer is computed."""

@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import (
-    INTERRUPTED,
-    Checkpoint,
-    Event,
-    Progress,
-    Reach,
-    Trajectory,
-    integrate,
-)
+from spirillum.dynamics.integration import INTERRUPTED, Checkpoint, Event, Reach, Trajectory, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.start import reach_of
@@ -26,6 +18,7 @@ from spirillum.errors import InputError
 from spirillum.kernels import core
 from spirillum.kernels import tube_motion as kernel
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.swimming.prediction import Prediction
 
 if TYPE_CHECKING:

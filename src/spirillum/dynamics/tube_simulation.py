@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.rotating_field import Field, in_tilted_field
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.run_summary import end_state
@@ -26,6 +25,7 @@ from spirillum.kernels import core
 from spirillum.kernels.core import MOTIONS, largest_yaw, resistance_at
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note, note_attributes, notes_in
+from spirillum.progress import Progress
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of

@@ -16,18 +16,11 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity, with_notes_last
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fields.fluid_field import FluidField, checked_points, flow_field
-from spirillum.fields.grid import (
-    PLANE_RESOLUTION,
-    VOLUME_RESOLUTION,
-    PointGrid,
-    Progress,
-    box_around,
-    dataset_on,
-    plane_around,
-)
+from spirillum.fields.grid import PLANE_RESOLUTION, VOLUME_RESOLUTION, PointGrid, box_around, dataset_on, plane_around
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fluid.tube.domain import pose_of
 from spirillum.notes import Note, note_attributes
+from spirillum.progress import Progress
 from spirillum.quantities import unit_of
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution

@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, check_choice, check_range
+from spirillum.progress import Progress, tell
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import TubePose
 from spirillum.units import KINDS, Kind, parse_option, show
@@ -18,11 +19,8 @@ from spirillum.units import KINDS, Kind, parse_option, show
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[str, int, int], None]
-PLANES = {"xz": "y", "xy": "z", "yz": "x"}
-"""Planes by the names of their axes, and the axis across each."""
-PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
-"""Points along the longest side of a plane and of a box."""
+PLANES = {"xz": "y", "xy": "z", "yz": "x"}  #: Planes by the names of their axes, and the axis across each.
+PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80  #: Points along the longest side of a plane and of a box.
 _OFFSET = Kind("length", "m", "5 mm", "-100 m", "100 m")
 _AXES = "xyz"
 _MOST_POINTS = 2_000_000
@@ -166,8 +164,7 @@ def dataset_on(
     values = np.full((grid.size, 4), np.nan)
     solid = np.zeros(grid.size, dtype=bool)
     for start in range(0, grid.size, _BLOCK):
-        if progress is not None:
-            progress("flow: points", start, grid.size)
+        tell(progress, "flow: points", start, grid.size)
         block = slice(start, min(start + _BLOCK, grid.size))
         points = grid.points(block.start, block.stop)
         solid[block] = inside(points)
@@ -175,8 +172,7 @@ def dataset_on(
         if free.any():
             velocity, pressure = fields(points[free])
             values[block][free] = np.column_stack([velocity, pressure])
-    if progress is not None:
-        progress("flow: points", grid.size, grid.size)
+    tell(progress, "flow: points", grid.size, grid.size)
     dims = tuple(axis for axis, count in zip(_AXES, grid.shape, strict=True) if count > 1)
     shape = tuple(count for count in grid.shape if count > 1)
     columns = {

@@ -17,11 +17,11 @@ from typing import Any, Literal, NamedTuple
 
 from pydantic import Field
 
-from spirillum.dynamics.integration import Progress
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.reference_errors import CHECKED, tail_error
 from spirillum.fluid.resistance import resistance
 from spirillum.papers.caldag2019.released import released_motion
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import Section, field_values
 from spirillum.robot.load import load

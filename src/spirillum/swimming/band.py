@@ -26,6 +26,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
@@ -43,8 +44,6 @@ of the default's; pitched by 2.5 degrees at 0.5 mm, within 0.2 % and 0.6 %. A ba
 """
 _SLACK = 1.0 + 1e-6  # rounding must not carry the steepest pose out of the domain
 _SWEPT = 129  # rings of what the tail sweeps in a turn
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -169,7 +168,7 @@ def band_of(
     model: SwimmerModel,
     reference: Swimming,
     answer: Callable[[RobotBatch], Swimming],
-    tell: Progress,
+    progress: Progress | None,
 ) -> Band | None:
     """The band of one robot; None where its placement leaves nothing open."""
     places = band_poses(batch, model)
@@ -180,14 +179,14 @@ def band_of(
         assert place.gap is not None  # noqa: S101 - every pose has both
         assert place.pitch is not None  # noqa: S101
         where = f"gap {show(place.gap, 'mm')}, pitch {show(place.pitch, 'deg')}"
-        tell(f"{model.name}, {where}", done + 1, len(places) + 1)
+        tell(progress, f"{model.name}, {where}", done + 1, len(places) + 1)
         there = at_pose(batch, place)
         found.append(answer(there))
         if not found[-1].valid[0]:
             outside = broken(requirements(there, model))
             why = outside[0].sentence() if outside else "the robot finds no steady motion there"
             left_out.append(Note.named("pose-left-out", where=where, why=why))
-    tell(model.name, len(places) + 1, len(places) + 1)
+    tell(progress, model.name, len(places) + 1, len(places) + 1)
     return Band(
         left_open(batch.pose, model),
         np.array([place.gap for place in places], dtype=float),

@@ -21,6 +21,7 @@ from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.progress_messages import LEVEL, TILTED, solution_message
 from spirillum.kernels.native import run_together
 from spirillum.notes import Note
+from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
@@ -200,7 +201,7 @@ def predict(
     placement: Placement | Mapping[str, Any] | None = None,
     band: bool | None = None,
     motion: str = "held",
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot with fitted values `fit`; else arguments as of `spirillum.predict`."""
     own, given, drawn = load(robot), Placement.of(placement), fit.posterior
@@ -243,13 +244,12 @@ def predict(
         )
         if not knows_torque(ready, chosen):
             intervals, torque = without_torque(intervals), [Note.named("torque-not-fitted")]
-    tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         direct, tilted = chosen.form == "direct", bool(batch.placement.pitch or batch.placement.yaw)
         if direct and not tilted:
             instead = "" if why_no_table(batch) else "; `spirillum prepare` makes further answers immediate"
-            tell(f"{solution_message(LEVEL)}{instead}", 0, 1)
-        tell(solution_message(TILTED) if direct and tilted else chosen.name, 0, 1)
+            tell(progress, f"{solution_message(LEVEL)}{instead}", 0, 1)
+        tell(progress, solution_message(TILTED) if direct and tilted else chosen.name, 0, 1)
     checks = scenario.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = scenario.swim(batch)
     if not result.valid[0]:
@@ -257,7 +257,7 @@ def predict(
     warnings = [*ready.warnings, *scenario.warnings(result)]
     error = scenario.error_estimate(result, checks)
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
-    over = band_of(batch, chosen, result, scenario.swim, tell) if with_band else None
+    over = band_of(batch, chosen, result, scenario.swim, progress) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
     if intervals is not None and whose == "measured":
         result = with_middles(result, intervals)

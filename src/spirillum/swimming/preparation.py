@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken
 from spirillum.robot.load import load, with_resolution
@@ -178,7 +179,7 @@ def prepare(
     *,
     stage: str = "yaw",
     workers: int = 1,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Prepared:
     """Make the table of a robot in its tube, or read the one that is there, of this stage or a finer one.
 
@@ -204,7 +205,7 @@ def prepare_all(
     *,
     stage: str = "yaw",
     workers: int = 1,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Prepared, ...]:
     """Make the tables of several robots, as `prepare` does that of one.
 
@@ -270,7 +271,7 @@ def check_usual_resolution(options: ModelOptions) -> None:
         )
 
 
-def table_for(batch: RobotBatch, *, progress: Callable[[str, int, int], None] | None = None) -> TubeTable:
+def table_for(batch: RobotBatch, *, progress: Progress | None = None) -> TubeTable:
     """Return the table, with yawed poses, for motion of the first robot of a batch in its tube; made if missing."""
     return prepared_tables([_asked(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
 

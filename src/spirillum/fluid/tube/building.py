@@ -26,7 +26,6 @@ from spirillum.fluid.tube.nodes import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.outer_resistance import (
     PHASES,
     NodeSolution,
-    Progress,
     all_kept,
     even_phases,
     factor_of,
@@ -49,6 +48,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.core import MOTIONS, film_at
+from spirillum.progress import Progress
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import TubePose
 

@@ -22,7 +22,6 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
 from spirillum.fluid.tube.domain import pose_limits, pose_of, tube_radius
-from spirillum.fluid.tube.outer_resistance import Progress
 from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import BELOW, TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
@@ -30,6 +29,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
 from spirillum.kernels.core import INSIDE, MOTIONS, largest_yaw, mean_resistance_at, mean_resistances
 from spirillum.kernels.tube_table import PHASES
+from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 

@@ -6,7 +6,7 @@ to contact, is kept as a Cholesky factor with logarithms on the diagonal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.core import MOTIONS as RATES
 from spirillum.kernels.core import cut_of_film
 from spirillum.kernels.tube_table import MIRROR
+from spirillum.progress import Progress
 from spirillum.robot.tube_pose import TubePose
 from spirillum.units import show
 from spirillum.worker_pool import imap_unordered
@@ -30,10 +31,7 @@ PHASES = 2 * HARMONICS + 1
 _PHASES_OF_STARTS = 5
 """Phases of a tail with several starts: two harmonics of its period."""
 
-Progress = Callable[[str, int, int], None]
-
-_RATES = np.zeros((MOTIONS, RATES))
-"""The 12 twists and the flow from the 8 rates (U, Omega, omega_m, mean flow)."""
+_RATES = np.zeros((MOTIONS, RATES))  # The 12 twists and the flow from the 8 rates (U, Omega, omega_m, mean flow).
 _RATES[:6, :6] = _RATES[6:12, :6] = np.eye(6)
 _RATES[9, 6] = _RATES[12, 7] = 1.0
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Flags, Samples
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.simulation import simulate
 from spirillum.errors import InputError
+from spirillum.progress import Progress
 from spirillum.robot.robot import Robot
 
 _SAMPLES = 24  # samples a turn
