@@ -171,8 +171,7 @@ def _tangent(times: Samples, jacobians: Samples) -> Samples:
 
     after = np.concatenate([jacobians[1:], jacobians[-1:]])
     factors = expm(np.diff(times)[:, None, None] * 0.5 * (jacobians + after))
-    found: Samples = reduce(lambda total, factor: factor @ total, factors)
-    return found
+    return reduce(lambda total, factor: factor @ total, factors)
 
 
 def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:

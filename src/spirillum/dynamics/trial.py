@@ -147,8 +147,7 @@ class TrialUnknown(NamedTuple):
         """Values at shares of the distribution, between 0 and 1."""
         if self.kind == "uniform":
             return self.low + (self.high - self.low) * shares
-        found: Samples = self.low * (self.high / self.low) ** shares
-        return found
+        return self.low * (self.high / self.low) ** shares
 
     def to_dict(self, share: float) -> dict[str, Any]:
         """Its entry in `unknowns` of an answer, with its share of the variance."""

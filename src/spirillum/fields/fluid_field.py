@@ -147,13 +147,11 @@ class FlowField(FluidField):
         matrix = self.viscosity * (rows[:6] + rows[6:])
         back, forth = _rotation(-self.phase), _rotation(self.phase)
         turned = matrix @ (self.twists.reshape(4, 3) @ back.T).ravel()
-        held: Samples = (turned.reshape(2, 3) @ forth.T).ravel()
-        return held
+        return (turned.reshape(2, 3) @ forth.T).ravel()
 
     def _tail_frame(self, points: Samples) -> Samples:
         """Turned back by the phase."""
-        turned: Samples = points @ _rotation(self.phase)
-        return turned
+        return points @ _rotation(self.phase)
 
     def _sum(self, points: Samples) -> Samples:
         s = self.solution

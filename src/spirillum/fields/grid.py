@@ -52,8 +52,7 @@ class PointGrid:
     def points(self, start: int, stop: int) -> Samples:
         """Points number `start` to `stop`, z fastest, (n, 3)."""
         indices = np.unravel_index(np.arange(start, stop), self.shape)
-        points: Samples = np.stack([axis[index] for axis, index in zip(self.axes, indices, strict=True)], axis=-1)
-        return points
+        return np.stack([axis[index] for axis, index in zip(self.axes, indices, strict=True)], axis=-1)
 
 
 def plane_around(
@@ -146,8 +145,7 @@ def _sizes(box: dict[str, tuple[float, float]], resolution: int) -> tuple[float,
 
 def _even(centre: float, spacing: float, count: int) -> Samples:
     """Points about a centre, with one spacing for all axes: no direction is resolved better than another."""
-    coordinates: Samples = centre + spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
-    return coordinates
+    return centre + spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
 
 
 def dataset_on(

@@ -86,8 +86,7 @@ class TubeFlowField(FluidField):
     def wrench(self) -> Samples:
         """See `FluidField.wrench`."""
         both = self.viscosity * (self.held.matrix @ self.twists - self.mean_flow * self.held.load)
-        held: Samples = both[:6] + both[6:]
-        return held
+        return both[:6] + both[6:]
 
     @property
     def pressure_rise(self) -> float:
@@ -112,8 +111,7 @@ class TubeFlowField(FluidField):
     @cached_property
     def _forces(self) -> Samples:
         """Along the wires, (stations, 3)."""
-        forces: Samples = (self.held.strengths.forces @ self._motion).reshape(-1, 3)
-        return forces
+        return (self.held.strengths.forces @ self._motion).reshape(-1, 3)
 
     @cached_property
     def _density(self) -> Amplitudes:
@@ -126,8 +124,7 @@ class TubeFlowField(FluidField):
             for m, here in enumerate(rows.of_mode):
                 found[m, here] += phase * values[starts[m] : starts[m + 1]]
         shaped = found.reshape(solids.modes, *solids.panels.x.shape, 3)
-        density: Amplitudes = np.ascontiguousarray(np.moveaxis(shaped, 0, 2))
-        return density
+        return np.ascontiguousarray(np.moveaxis(shaped, 0, 2))
 
     @cached_property
     def _wall(self) -> _Reflection:

@@ -15,8 +15,7 @@ _AXIAL_BOTH = np.array([0, 3, 6, 9])
 
 def dyad(vector: Vectors, other: Vectors | None = None) -> Tensors:
     """The dyadic product of two vectors, or of one with itself, 3x3."""
-    product: Tensors = vector[..., :, None] * (vector if other is None else other)[..., None, :]
-    return product
+    return vector[..., :, None] * (vector if other is None else other)[..., None, :]
 
 
 def skew(vector: Vectors) -> Tensors:

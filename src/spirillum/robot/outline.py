@@ -75,8 +75,7 @@ class Arc:
     def slope(self, t: Samples) -> Samples:
         """dx/dt."""
         turn = self.angles[1] - self.angles[0]
-        slope: Samples = -self.semi_axes[0] * np.sin(self.angles[0] + turn * t) * turn
-        return slope
+        return -self.semi_axes[0] * np.sin(self.angles[0] + turn * t) * turn
 
     @property
     def length(self) -> float:

@@ -212,5 +212,4 @@ def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
 
 def _unit_or_zero(vectors: Samples) -> Samples:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    unit: Samples = vectors / np.where(length > 0, length, 1.0)
-    return unit
+    return vectors / np.where(length > 0, length, 1.0)

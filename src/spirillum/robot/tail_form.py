@@ -49,8 +49,7 @@ class TailForm(NamedTuple):
     @property
     def turns(self) -> Samples:
         """Angle of each wire about the axis against the first, rad, (starts,)."""
-        turns: Samples = 2.0 * np.pi * np.arange(self.starts) / self.starts
-        return turns
+        return 2.0 * np.pi * np.arange(self.starts) / self.starts
 
     @property
     def rotations(self) -> Tensors:
@@ -82,8 +81,7 @@ class TailForm(NamedTuple):
             b = b * self.amplitude_at(_SHARES)[0]
         if self.wavelength:
             wave = wave / self.wavenumber_at(_SHARES)[0]
-        both: tuple[Values, Values] = np.broadcast_arrays(b, wave)[0], np.broadcast_arrays(b, wave)[1]
-        return both
+        return np.broadcast_arrays(b, wave)[0], np.broadcast_arrays(b, wave)[1]
 
     def arc_length(self, amplitude: Values, wavelength: Values, length: Values) -> Values:
         """Length of a wire without the rise of its amplitude at the root, m."""
@@ -155,8 +153,7 @@ class CentreLine:
         """At least so many parameters, those between which it is a cubic among them."""
         knots = self._spline.x
         steps = int(np.ceil(count / (len(knots) - 1)))
-        found: Samples = np.append(np.linspace(knots[:-1], knots[1:], steps, endpoint=False).T.ravel(), 1.0)
-        return found
+        return np.append(np.linspace(knots[:-1], knots[1:], steps, endpoint=False).T.ravel(), 1.0)
 
     def at(self, share: Values) -> tuple[Values, Values]:
         """Points (..., 3), m, and derivatives by the parameter."""

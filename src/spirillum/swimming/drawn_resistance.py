@@ -180,8 +180,7 @@ class TubeResistance:
 
     def load(self, draws: Draws, flow: float) -> Samples:
         """Force and torques of an imposed mean flow on the robot at rest, (draws, robots, 3); as `whole`."""
-        found: Samples = flow * self._full(draws)[..., :-1, -1] * self._viscosities(draws)[..., None]
-        return found
+        return flow * self._full(draws)[..., :-1, -1] * self._viscosities(draws)[..., None]
 
     def _viscosities(self, draws: Draws) -> Samples:
         return np.asarray(draws["viscosity"]) if "viscosity" in draws else self.viscosity
@@ -263,8 +262,7 @@ def error_of_mean(
 
     The scatter of trials holds the error of each measurement. So a trial's error is the larger of both, not their sum.
     """
-    found: Samples = np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
-    return found
+    return np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
 
 
 def _compared(name: str, predicted: Mapping[str, Samples], tail: Mapping[str, object]) -> Samples:

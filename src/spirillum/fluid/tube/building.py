@@ -90,8 +90,7 @@ class OnAxis:
     def _at(self, pitch: float) -> Samples:
         apart = self.pitches[:, None] - self.pitches + np.eye(self.pitches.size)
         ahead = np.where(np.eye(self.pitches.size, dtype=bool), 1.0, (pitch - self.pitches) / apart)
-        found: Samples = np.tensordot(np.prod(ahead, axis=1), self.values, axes=1)
-        return found
+        return np.tensordot(np.prod(ahead, axis=1), self.values, axes=1)
 
 
 def _about_x(angle: float) -> Samples:
@@ -327,8 +326,7 @@ def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
 def _powers(middle: Samples, sides: Samples) -> Samples:
     """Coefficients of the powers of the stretched yaw from values at `YAW_SHARES`, (orders, phases, 36)."""
     odd, even = 0.5 * (sides[:, 0] - sides[:, 1]), 0.5 * (sides[:, 0] + sides[:, 1]) - middle
-    found: Samples = np.tensordot(np.linalg.inv(kernel.yaw_parts_at_nodes()), np.concatenate([odd, even]), axes=1)
-    return found
+    return np.tensordot(np.linalg.inv(kernel.yaw_parts_at_nodes()), np.concatenate([odd, even]), axes=1)
 
 
 def _both_sides(film: Samples, place: _Place, starts: int, own: Samples, image: Samples) -> tuple[Samples, Samples]:

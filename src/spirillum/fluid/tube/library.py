@@ -150,8 +150,7 @@ def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: S
     which = np.broadcast_to(np.arange(len(tables)), gap.shape)
     mean_resistances(tables, which.ravel(), gap.ravel(), pitch.ravel(), yaw.ravel(), PHASES, found)
     axes = along_the_tube(pitch, yaw)
-    whole: Samples = np.swapaxes(axes, -1, -2) @ found.reshape(*gap.shape, MOTIONS, MOTIONS) @ axes
-    return whole
+    return np.swapaxes(axes, -1, -2) @ found.reshape(*gap.shape, MOTIONS, MOTIONS) @ axes
 
 
 class TabledTube(Tube):

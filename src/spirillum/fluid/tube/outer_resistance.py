@@ -47,8 +47,7 @@ class NodeSolution(NamedTuple):
 
 def matrix_of(full: Samples) -> Samples:
     """The 8x8 over U, Omega, omega_m and the mean flow from the (13, 13) of `tube`, over leading axes."""
-    found: Samples = _RATES.T @ full @ _RATES
-    return found
+    return _RATES.T @ full @ _RATES
 
 
 def _solve(place: NodeSolution) -> list[Samples]:
@@ -158,8 +157,7 @@ def fourier(values: Samples, size: int = 0, starts: int = 1) -> Samples:
     for harmonic in range(1, (count - 1) // 2 + 1):
         if (at := 2 * starts * harmonic) < size:
             rows[at - 1], rows[at] = np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count
-    found: Samples = np.tensordot(rows, values, axes=1)
-    return found
+    return np.tensordot(rows, values, axes=1)
 
 
 def matrices_at(coefficients: Samples, phases: Samples) -> Samples:
@@ -172,8 +170,7 @@ def matrices_at(coefficients: Samples, phases: Samples) -> Samples:
     parameters[:, _DIAGONAL] = np.exp(parameters[:, _DIAGONAL])
     factors = np.zeros((len(phases), RATES, RATES))
     factors[:, _LOWER[0], _LOWER[1]] = parameters
-    found: Samples = factors @ np.swapaxes(factors, 1, 2)
-    return found
+    return factors @ np.swapaxes(factors, 1, 2)
 
 
 def even_phases(count: int = PHASES, starts: int = 1) -> tuple[float, ...]:
@@ -198,8 +195,7 @@ def outer_resistance(matrices: Samples, film: Samples, t: float) -> Samples:
     """The outer part of resistances, (phases, 8, 8), of which the film's is (6, 6)."""
     rest = matrices.copy()
     rest[:, :6, :6] -= cut_of_film(t) * film
-    found: Samples = 0.5 * (rest + np.swapaxes(rest, 1, 2))
-    return found
+    return 0.5 * (rest + np.swapaxes(rest, 1, 2))
 
 
 def is_positive_definite(matrices: Samples) -> bool:

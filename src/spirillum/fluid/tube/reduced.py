@@ -171,8 +171,7 @@ def _screen(solids: Solids, sources: Sources) -> Samples:
     x, rho = (values.ravel()[:, None] for values in (solids.panels.x, solids.panels.rho))
     apart = (x - sources.x) ** 2 + (rho - sources.rho) ** 2
     clear = solids.pose.distances(x.ravel(), rho.ravel())[:, None] * solids.pose.distances(sources.x, sources.rho)
-    found: Samples = 1.0 - apart / (apart + 4.0 * np.maximum(clear, 0.0))
-    return found
+    return 1.0 - apart / (apart + 4.0 * np.maximum(clear, 0.0))
 
 
 def _reflected(solids: Solids, waves: WallWaves, placed: Samples, away: float) -> list[Samples]:

@@ -78,8 +78,7 @@ def sent_to_wall(waves: WallWaves, number: int, points: Samples, forces: Samples
 def midpoints(orders: int, modes: int, *, whole: bool = False) -> Samples:
     """Midpoints of a half circle, as many as waves need whose modes are then cut off, or of the whole one."""
     count = int(0.6 * (orders + modes)) + 12
-    angles: Samples = np.pi * (np.arange(2 * count if whole else count) + 0.5) / count
-    return angles
+    return np.pi * (np.arange(2 * count if whole else count) + 0.5) / count
 
 
 def projectors(theta: Samples, modes: int, parity: int) -> tuple[Samples, Samples, Samples]:

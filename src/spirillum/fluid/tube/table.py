@@ -123,8 +123,7 @@ class _Reader:
         whole = np.moveaxis(changes, 0, -1).astype(np.int32)
         for axis in (0, 1):
             whole = np.cumsum(whole, axis=axis, dtype=np.int32)
-        found: Samples = whole.astype(np.float64)
-        return found
+        return whole.astype(np.float64)
 
     def _taken(self, count: int) -> bytes:
         start, self._at = self._at, self._at + count
@@ -152,15 +151,13 @@ def _rows_of(rest: Samples) -> Samples:
 
 def _times(matrix: Samples, yawed: Samples) -> Samples:
     """A matrix over the orders times (yaw gaps, yaw pitches, orders, phases, 36)."""
-    found: Samples = np.moveaxis(np.tensordot(matrix, yawed, axes=(1, 2)), 0, 2)
-    return found
+    return np.moveaxis(np.tensordot(matrix, yawed, axes=(1, 2)), 0, 2)
 
 
 def _steps(rows: Samples) -> Samples:
     """Steps of the rest and of what a yaw adds to it at its nodes, (36,)."""
     row, column = np.tril_indices(core.MOTIONS)
-    found: Samples = _REST * np.where(row == column, 1.0, rows[row])
-    return found
+    return _REST * np.where(row == column, 1.0, rows[row])
 
 
 def _film_of(film: Samples) -> tuple[Samples, Samples]:

@@ -186,8 +186,7 @@ def point_waves(
 
 def distances_of(points: Samples, radius: float) -> Samples:
     """Distances of points from the wall, (n,), m."""
-    distances: Samples = radius - np.hypot(points[:, 1], points[:, 2])
-    return distances
+    return radius - np.hypot(points[:, 1], points[:, 2])
 
 
 def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.ndarray]:

@@ -66,8 +66,7 @@ class Panels:
     @cached_property
     def area(self) -> Samples:
         """Element rho du at each node: surface element over ds dtheta/du, (nodes,)."""
-        area: Samples = (self.rule[4] * self.rho).ravel()
-        return area
+        return (self.rule[4] * self.rho).ravel()
 
     @cached_property
     def solid_of_node(self) -> np.ndarray:
@@ -309,8 +308,7 @@ class Sources:
             m * k_x / around - by_x[..., 2],
             by_x[..., 1] - by_rho[..., 0],
         )
-        found: Samples = 0.5 * np.stack(torques, axis=-1).reshape(modes, rows, -1)
-        return found
+        return 0.5 * np.stack(torques, axis=-1).reshape(modes, rows, -1)
 
 
 def _each(split: Samples, blocks: Samples) -> Samples:
