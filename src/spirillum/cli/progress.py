@@ -8,8 +8,7 @@ from threading import Event, Lock, Thread, Timer
 from time import monotonic
 
 _PERIOD = 15.0  # least time between two lines, s
-FIRST = 5.0
-"""Time after which the first line is printed, s; shorter work prints none."""
+FIRST = 5.0  #: Time after which the first line is printed, s; shorter work prints none.
 _SHARE = 0.05  # least time between two lines over the time since the start, so that a long log stays readable
 _AT_ONCE = 1.0  # work that is done within this time from the start of a stage was cached and does not enter the pace, s
 _FEWEST = 2  # steps from which on a time left is stated

@@ -138,8 +138,7 @@ def _check_forward(speed: float) -> float:
 class _CourseTask(Task):
     """What the tasks of speed share."""
 
-    leash: ClassVar[float] = np.inf
-    """See `KeepCourse`: whether the displacement by a pulse of flow is recovered."""
+    leash: ClassVar[float] = np.inf  #: See `KeepCourse`: whether the displacement by a pulse of flow is recovered.
 
     speed: Annotated[Velocity, AfterValidator(_check_forward)] | None = None
     """Speed along the robot's path. It has to be given."""
@@ -229,8 +228,7 @@ class RideOutTask(_CourseTask):
     error_name: ClassVar[str] = "distance from the course at the end"
     error_unit: ClassVar[str] = "m"
 
-    tolerance: Length = _BAND
-    """How far from the course is good."""
+    tolerance: Length = _BAND  #: How far from the course is good.
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
         """The course, and the tolerance around it."""

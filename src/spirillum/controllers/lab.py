@@ -38,34 +38,23 @@ class CameraModel(Options):
     argument: ClassVar[str] = "camera"
     prefixed: ClassVar[bool] = True
 
-    fps: Annotated[float, BeforeValidator(in_range(0.1, 1000.0, " frames a second"))] = 30.0
-    """Frames a second."""
-    latency: _Delay = 0.1
-    """From a frame's exposure until the controller has its numbers."""
-    dropped: _Share = 0.02
-    """Share of frames that never arrive, each by itself."""
-    fails_at: Time | None = None
-    """From when on nothing arrives any more; None: never."""
+    fps: Annotated[float, BeforeValidator(in_range(0.1, 1000.0, " frames a second"))] = 30.0  #: Frames a second.
+    latency: _Delay = 0.1  #: From a frame's exposure until the controller has its numbers.
+    dropped: _Share = 0.02  #: Share of frames that never arrive, each by itself.
+    fails_at: Time | None = None  #: From when on nothing arrives any more; None: never.
     scale_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.002
     """Relative standard deviation of the scale, one value for a whole run."""
     position_noise: LengthOrZero = 1e-5
     """Standard deviation of the position along the channel, independent from frame to frame."""
     heading_noise: _AngleNoise = 7e-4
     """Standard deviation of the heading (yaw, as seen from above), of each frame by itself."""
-    body_angle_noise: _AngleNoise = 3e-3
-    """Standard deviation of the body's angle, of each frame by itself."""
-    tail_phase_noise: _AngleNoise = 1e-2
-    """Standard deviation of the tail's phase, of each frame by itself."""
-    position_wander: LengthOrZero = 3e-5
-    """Standard deviation of the slow error of the position along the channel."""
-    heading_wander: _AngleNoise = 2.5e-3
-    """Standard deviation of the slow error of the heading."""
-    body_angle_wander: _AngleNoise = 7e-3
-    """Standard deviation of the slow error of the body's angle."""
-    tail_phase_wander: _AngleNoise = 1.8e-2
-    """Standard deviation of the slow error of the tail's phase."""
-    memory: _Period = 1.0
-    """Correlation time of the slow errors."""
+    body_angle_noise: _AngleNoise = 3e-3  #: Standard deviation of the body's angle, of each frame by itself.
+    tail_phase_noise: _AngleNoise = 1e-2  #: Standard deviation of the tail's phase, of each frame by itself.
+    position_wander: LengthOrZero = 3e-5  #: Standard deviation of the slow error of the position along the channel.
+    heading_wander: _AngleNoise = 2.5e-3  #: Standard deviation of the slow error of the heading.
+    body_angle_wander: _AngleNoise = 7e-3  #: Standard deviation of the slow error of the body's angle.
+    tail_phase_wander: _AngleNoise = 1.8e-2  #: Standard deviation of the slow error of the tail's phase.
+    memory: _Period = 1.0  #: Correlation time of the slow errors.
 
 
 class Meter(Options):
@@ -76,10 +65,8 @@ class Meter(Options):
 
     rate: Annotated[float, BeforeValidator(in_range(0.0, 1000.0, " readings a second"))] = 10.0
     """Readings a second; 0: no meter."""
-    latency: _Delay = 0.05
-    """From a reading until the controller has it."""
-    current_noise: Current = 1e-3
-    """Standard deviation of the current of one reading."""
+    latency: _Delay = 0.05  #: From a reading until the controller has it.
+    current_noise: Current = 1e-3  #: Standard deviation of the current of one reading.
     voltage_noise: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 1e-3
     """Relative standard deviation of the voltage of one reading."""
     gain_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.005
@@ -95,12 +82,9 @@ class Remote(Options):
     argument: ClassVar[str] = "remote"
     prefixed: ClassVar[bool] = True
 
-    period: _Period = 0.108
-    """Between two commands; a controller decides once in a period."""
-    delay: _Delay = 0.068
-    """From the decision until the drive follows."""
-    lost: _Share = 0.05
-    """Share of commands that never arrive, each by itself; the drive then keeps the last one."""
+    period: _Period = 0.108  #: Between two commands; a controller decides once in a period.
+    delay: _Delay = 0.068  #: From the decision until the drive follows.
+    lost: _Share = 0.05  #: Share of commands that never arrive, each by itself; the drive then keeps the last one.
 
 
 class Pulse(Options):
@@ -109,10 +93,8 @@ class Pulse(Options):
     argument: ClassVar[str] = "pulse"
     prefixed: ClassVar[bool] = True
 
-    velocity: Velocity = 5e-4
-    """Mean flow while it lasts; 0: no pulse."""
-    duration: Time = 2.0
-    """How long it lasts."""
+    velocity: Velocity = 5e-4  #: Mean flow while it lasts; 0: no pulse.
+    duration: Time = 2.0  #: How long it lasts.
     start: Time | None = None
     """When it begins; None: sampled uniformly over the first nine tenths of the run, with a random sign."""
 

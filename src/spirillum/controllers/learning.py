@@ -276,8 +276,7 @@ class Learner:
         self._lab, self._bank = lab, bank
         self._sights: list[Detection] = []
         self._readings: list[MeterReading] = []
-        self._duties: list[tuple[float, float]] = [(0.0, 0.0)]
-        """From when on the drive has which duty, s."""
+        self._duties: list[tuple[float, float]] = [(0.0, 0.0)]  #: From when on the drive has which duty, s.
         self._sent: list[tuple[float, float]] = [(0.0, 0.0)]
         self._next = SETTLING + 2.0 * BLOCK
         self.learnt: RobotEstimate | None = None

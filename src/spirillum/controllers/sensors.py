@@ -131,8 +131,7 @@ class Senses:
 
     def __init__(self, lab: Lab, seed: int) -> None:
         self._lab = lab
-        self.pictured = 0.0
-        """Time of the last frame that was not lost, whether or not the robot is seen on it, s."""
+        self.pictured = 0.0  #: Time of the last frame that was not lost, whether or not the robot is seen on it, s.
         self._camera, self._meter, self._remote = (_stream(seed, name) for name in ("camera", "meter", "remote"))
         self._scale = 1.0 + lab.camera.scale_error * float(self._camera.standard_normal())
         self._sizes = np.array(

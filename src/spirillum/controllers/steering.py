@@ -185,10 +185,8 @@ class KeepAxisTask(Task):
 
     law: Annotated[Law, BeforeValidator(one_of("position", "aim"))] = "position"
     """`position`: feedback of the lateral position, with the predicted orbit; `aim`: at a point of the axis ahead."""
-    rate: Rate | None = None
-    """Of the field, at most 0.9 of the step-out rate; None: the robot's own."""
-    tolerance: Length = 5e-4
-    """How far from the axis is good."""
+    rate: Rate | None = None  #: Of the field, at most 0.9 of the step-out rate; None: the robot's own.
+    tolerance: Length = 5e-4  #: How far from the axis is good.
 
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> SteeringBrief:
         """Check the field's rate, find orbit and gain, and the tilts for the robot of the file."""

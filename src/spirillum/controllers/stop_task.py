@@ -96,10 +96,8 @@ class StopAtTask(Task):
     error_name: ClassVar[str] = "distance from the goal at the end"
     error_unit: ClassVar[str] = "m"
 
-    at: SignedLength | None = None
-    """x of the body's mid-length at which to stop; it starts at 0. It has to be given."""
-    tolerance: Length = 1e-3
-    """How far beside it is good."""
+    at: SignedLength | None = None  #: x of the body's mid-length at which to stop; it starts at 0. It has to be given.
+    tolerance: Length = 1e-3  #: How far beside it is good.
 
     @property
     def goal(self) -> float:

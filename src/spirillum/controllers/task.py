@@ -68,12 +68,9 @@ class Task(Options):
     argument: ClassVar[str] = "task"
     prefixed: ClassVar[bool] = True
     kind: ClassVar[str]
-    error_name: ClassVar[str]
-    """What `Score.error` is, in words."""
-    error_unit: ClassVar[str]
-    """SI."""
-    across: ClassVar[bool] = False
-    """Whether it concerns the distance from the tube's axis, not the position along it."""
+    error_name: ClassVar[str]  #: What `Score.error` is, in words.
+    error_unit: ClassVar[str]  #: SI.
+    across: ClassVar[bool] = False  #: Whether it concerns the distance from the tube's axis, not the position along it.
 
     duration: Annotated[Time, within(0.1, _LONGEST, "s")] | None = None
     """Of a run; None: from the speed that is predicted."""

@@ -31,14 +31,11 @@ class Judged(Options):
 
     statistic: Literal["mean", "quantile"] = "mean"
     """Of the objective over the draws: its mean, or the quantile of its worse end."""
-    level: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
-    """Of the quantile: the share of the draws that are worse."""
-    confidence: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
-    """Share of the draws that must satisfy a condition."""
+    level: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1  #: Of the quantile: the share of the draws that are worse.
+    confidence: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95  #: Share of the draws that must satisfy a condition.
     draws: Annotated[int, Field(strict=True, ge=8, le=16384)] = 256
     """Draws used by the search; the stated statistics use four times as many new ones."""
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
-    """Seed of draws and search."""
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1  #: Seed of draws and search.
     confirm: Annotated[bool, Field(strict=True)] = False
     """Make the tables that trials of the best three designs lack: 2 to 5 minutes of two cores each."""
 

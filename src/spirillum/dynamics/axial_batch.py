@@ -25,14 +25,11 @@ from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.units import parse_option
 
-FACTORS = ("friction", "viscosity")
-"""Ranges that are factors of the robot's own value, sampled log-uniformly."""
+FACTORS = ("friction", "viscosity")  #: Ranges that are factors of the robot's own value, sampled log-uniformly.
 _NAMES = tuple(item.name for item in PARAMETERS)
 _FIRST_RESPONSE = _NAMES.index("forward_velocity_per_torque")
-_FIXED = ("polarity", *_NAMES[_FIRST_RESPONSE:])
-"""Numbers that follow from others and cannot be sampled alone."""
-_LARGEST_FACTOR = 1e3
-"""Of friction and viscosity."""
+_FIXED = ("polarity", *_NAMES[_FIRST_RESPONSE:])  # Numbers that follow from others and cannot be sampled alone.
+_LARGEST_FACTOR = 1e3  # Of friction and viscosity.
 
 
 def checked_ranges(axial: AxialRobot, ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, float]]:
@@ -120,8 +117,7 @@ def posterior_numbers(axial: AxialRobot, posterior: str | Path, count: int) -> S
 _MOST = 10_000_000
 _LONGEST = 1e6
 _LAST_SEED = 2**31 - 1
-_POOL = 500
-"""Draws of a posterior that robots are taken from."""
+_POOL = 500  # Draws of a posterior that robots are taken from.
 
 
 class AxialBatch:
@@ -171,8 +167,7 @@ class AxialBatch:
         self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.axial, ranges)
         self._pool: Samples | None = None if posterior is None else posterior_numbers(self.axial, posterior, _POOL)
         self._rng = np.random.default_rng(seed)
-        self.time: Samples = np.zeros(count)
-        """Time since each was reset, s."""
+        self.time: Samples = np.zeros(count)  #: Time since each was reset, s.
         self.states: Samples = np.zeros((count, core.AXIAL_STATE_SIZE))
         """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7).
 

@@ -61,20 +61,16 @@ if TYPE_CHECKING:
 class AxialParameter(NamedTuple):
     """One number of the equations."""
 
-    name: str
-    """Field of the robot file, or quantity of the registry."""
-    unit: str
-    """SI."""
-    meaning: str
-    """What it is, in half a sentence."""
+    name: str  #: Field of the robot file, or quantity of the registry.
+    unit: str  #: SI.
+    meaning: str  #: What it is, in half a sentence.
 
 
 PARAMETERS = tuple(AxialParameter(**row) for row in rows_of("dynamics/axial_parameters.csv"))
 """The numbers in the order of the compiled equations, which index them by column."""
 STATES = ("motor_current", "position", "tail_angle", "body_angle", "battery_charge_used")
 """The state; quantities of the registry. The compiled equations have two integrals of the current behind it."""
-INPUTS = ("duty", "mean_flow")
-"""Inputs; quantities of the registry."""
+INPUTS = ("duty", "mean_flow")  #: Inputs; quantities of the registry.
 OUTPUTS = (
     *STATES[1:],
     "forward_velocity",
@@ -97,10 +93,8 @@ _ELECTRIC = ("motor_current", "battery_charge_used", "battery_voltage", "electri
 class AxialRobot:
     """The numbers of a robot in axial motion, SI; rates and current signed about +x."""
 
-    prediction: Prediction
-    """The steady motion, with robot, model and friction."""
-    values: tuple[float, ...]
-    """Of `PARAMETERS`; those of motor and battery do not apply to a motor with a curve."""
+    prediction: Prediction  #: The steady motion, with robot, model and friction.
+    values: tuple[float, ...]  #: Of `PARAMETERS`; those of motor and battery do not apply to a motor with a curve.
 
     @classmethod
     def of(cls, steady: Prediction) -> AxialRobot:
@@ -298,15 +292,13 @@ def steady_current(p: Samples, duty: float, flow: float) -> float:
 
 
 _SOURCE = "motor current (17) and the robot's linear response (8), (15)"
-_FINENESS = 16.0
-"""Pieces of a step over those of a batch: errors of 1e-9 however far apart the samples are."""
+_FINENESS = 16.0  # Pieces of a step over those of a batch: errors of 1e-9 however far apart the samples are.
 
 
 class AxialIntegrator(NamedTuple):
     """A method that integrates (17) and what rests on the current."""
 
-    name: str
-    """Method, order and tolerance in words."""
+    name: str  #: Method, order and tolerance in words.
     states: Callable[[AxialRobot, Samples, Samples], Samples]
     """States from rest, (n, 7), at times, s, (n,), among them every switching, with the duty up to each, (n,)."""
 

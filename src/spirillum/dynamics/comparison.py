@@ -33,17 +33,14 @@ from spirillum.swimming.model_choice import UNBOUNDED, WALLED
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import STEADY, friction_reading, headline, swim
 
-LIGHTHILL = "sbt"
-"""The theory from which the effects are counted."""
+LIGHTHILL = "sbt"  #: The theory from which the effects are counted.
 
 
 class Effect(NamedTuple):
     """One step from Lighthill's theory to the trial."""
 
-    name: str
-    """Effect that is included from here on."""
-    speed: float
-    """Forward velocity with this effect and all before it, m/s."""
+    name: str  #: Effect that is included from here on.
+    speed: float  #: Forward velocity with this effect and all before it, m/s.
 
 
 class _ApartFromEachOther(Slender):
@@ -94,8 +91,7 @@ def _steps(robot: Robot, answers: Mapping[str, Prediction], friction: str) -> It
     yield from _released(held, trial.values, friction)
 
 
-RELEASED_EFFECT = "contact and motion in time"
-"""The last effect, where there is a trial."""
+RELEASED_EFFECT = "contact and motion in time"  #: The last effect, where there is a trial.
 
 
 def _released(held: Prediction, trial: Mapping[str, float], friction: str) -> Iterator[Effect]:
@@ -121,14 +117,10 @@ class ModelComparison(DisplayMixin):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 
     robot: Robot
-    friction: FrictionReading
-    """Friction model, the same for all models."""
-    models: tuple[str, ...]
-    """Names of the models, in the order of the question."""
-    predictions: Mapping[str, Prediction]
-    """Answers by model, in that order."""
-    refusals: Mapping[str, str]
-    """Why a model does not answer, a sentence each."""
+    friction: FrictionReading  #: Friction model, the same for all models.
+    models: tuple[str, ...]  #: Names of the models, in the order of the question.
+    predictions: Mapping[str, Prediction]  #: Answers by model, in that order.
+    refusals: Mapping[str, str]  #: Why a model does not answer, a sentence each.
 
     @cached_property
     def reference(self) -> str:

@@ -35,10 +35,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_DRAWS = 100
-"""Draws of a posterior that are run."""
-_SURE = 80
-"""Number of draws from which on the limits of a 95 % interval are interpolated."""
+_DRAWS = 100  # Draws of a posterior that are run.
+_SURE = 80  # Number of draws from which on the limits of a 95 % interval are interpolated.
 _FEWEST, _MOST = 20, 1000
 _FACTORS = {
     "forward_velocity": ("advance", "motor_rate"),
@@ -144,10 +142,8 @@ def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset
     }
 
 
-DRAWS = 40
-"""Draws of a posterior that are followed: some second each."""
-_LEAST_SHARE = 0.95
-"""Share of the draws that have to reach a steady motion."""
+DRAWS = 40  #: Draws of a posterior that are followed: some second each.
+_LEAST_SHARE = 0.95  # Share of the draws that have to reach a steady motion.
 
 
 def intervals_of_free_motion(

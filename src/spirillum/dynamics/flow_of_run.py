@@ -37,14 +37,12 @@ _SCALARS = (
     *("tail_phase", "motor_rotation_rate", "body_rotation_rate", "tail_rotation_rate"),
 )
 _VECTORS = ("velocity", "angular_velocity")
-_NEEDED = ("time", *_SCALARS, *_VECTORS, "attitude")
-"""What a run in a tube has, and what its flow follows from."""
+_NEEDED = ("time", *_SCALARS, *_VECTORS, "attitude")  # What a run in a tube has, and what its flow follows from.
 
 _OWN_NAMES = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "flow": "mean_flow"}
 """Variables of a run by the fields of a placement that they become."""
 
-_SAME_TIME = 1e-3
-"""Share of the time between two samples within which a moment is that of a sample."""
+_SAME_TIME = 1e-3  # Share of the time between two samples within which a moment is that of a sample.
 _TOLERANCE = 0.03
 _THINNEST = 0.02
 """Thinnest film that is resolved, in diameters of the body: thinner ones of a yawed robot take many minutes."""
@@ -53,14 +51,12 @@ _THINNEST = 0.02
 class RunSnapshot(NamedTuple):
     """A robot in its tube at a moment of a run, in axes of the body that do not roll, SI; not solved for yet."""
 
-    prediction: Prediction
-    """Its motion as an answer, and the pose."""
+    prediction: Prediction  #: Its motion as an answer, and the pose.
     phase: float
     body: np.ndarray
     rotor: np.ndarray
     mean_flow: float
-    lifted: float
-    """How much further from the wall than in the run it is resolved, m."""
+    lifted: float  #: How much further from the wall than in the run it is resolved, m.
 
 
 def flow_of_run(

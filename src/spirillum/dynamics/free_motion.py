@@ -47,30 +47,21 @@ from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reyno
 from spirillum.swimming.steady import Swimming, swimming_of
 from spirillum.units import show
 
-_SAMPLES = 240
-"""Samples of a turn over which means are taken."""
+_SAMPLES = 240  # Samples of a turn over which means are taken.
 _MOST_SAMPLES = 20_000
-_FEW_TURNS = 6
-"""Turns of the tail within which a trial reaches its steady motion."""
-_LIGHT = 1e-9
-"""Weight in the fluid, over the forces that act, below which a robot has none."""
+_FEW_TURNS = 6  # Turns of the tail within which a trial reaches its steady motion.
+_LIGHT = 1e-9  # Weight in the fluid, over the forces that act, below which a robot has none.
 
 
 class FreeMotion(NamedTuple):
     """A free robot in its tube, followed to its steady motion."""
 
-    prediction: Prediction
-    """The steady motion; its pose is `prediction.lying`."""
-    run: LongRun
-    """How it came there."""
-    robot: TubeRobot
-    """What its rates follow from."""
-    start_gap: float
-    """Smallest distance between body and wall at release, m."""
-    release: Release
-    """As requested, without what is fitted of the contact."""
-    checked: Checked
-    """Whether its table was checked at this pose."""
+    prediction: Prediction  #: The steady motion; its pose is `prediction.lying`.
+    run: LongRun  #: How it came there.
+    robot: TubeRobot  #: What its rates follow from.
+    start_gap: float  #: Smallest distance between body and wall at release, m.
+    release: Release  #: As requested, without what is fitted of the contact.
+    checked: Checked  #: Whether its table was checked at this pose.
 
 
 def free_motion(

@@ -46,8 +46,7 @@ ROUGHNESS_SHARE = 1e-4
 """Roughness over the body's radius where none is given: 0.9 micrometres for the paper's robot. Assumed."""
 _SIDE = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math.sqrt(3 / 7), 49 / 180), (1.0, 1 / 20))
 """Rings along a straight side and their shares of it: both ends, and points between them (Gauss-Lobatto)."""
-_STIFFEST = 1e10
-"""Largest resistance of a film over that of the robot, so that numbers stay numbers."""
+_STIFFEST = 1e10  # Largest resistance of a film over that of the robot, so that numbers stay numbers.
 
 
 def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> tuple[Samples, Samples]:
@@ -138,25 +137,17 @@ _Robot = TypeVar("_Robot", bound="FreeRobot")
 class FreeRobot(ABC):
     """What the compiled equations need of a free robot, SI, about the origin in body axes."""
 
-    tolerance: float = 1e-8
-    """Error of a step over the sizes of the state's components."""
-    observed: ClassVar[int]
-    """Number of what is observed in a state."""
+    tolerance: float = 1e-8  #: Error of a step over the sizes of the state's components.
+    observed: ClassVar[int]  #: Number of what is observed in a state.
 
-    friction: Samples
-    """Friction of joint and wall against the seven rates (7, 7)."""
-    weight: Samples
-    """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
-    drive: Samples
-    """`Drive` of csrc/links.h, (48,)."""
+    friction: Samples  #: Friction of joint and wall against the seven rates (7, 7).
+    weight: Samples  #: Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,).
+    drive: Samples  #: `Drive` of csrc/links.h, (48,).
     table: Samples = field(default_factory=lambda: np.zeros(0))
     """The robot's table in its tube, see `spirillum.kernels.tube_table`; empty without walls."""
-    length: float
-    """A length of the robot's order, m."""
-    torque: float
-    """A torque of the order of those that act, N m."""
-    turn: float
-    """Time of the order of a turn of the tail, s."""
+    length: float  #: A length of the robot's order, m.
+    torque: float  #: A torque of the order of those that act, N m.
+    turn: float  #: Time of the order of a turn of the tail, s.
 
     @property
     @abstractmethod
@@ -293,12 +284,9 @@ class TwoLinks(FreeRobot):
 
     observed: ClassVar[int] = core.SEEN_CONTACT_FORCE
 
-    drag: Samples
-    """Resistance of both links against the seven rates at phase 0 of the tail (7, 7)."""
-    wall: Samples
-    """The channel's wall (4,), see `films_of`."""
-    spots: Samples
-    """Rings that may near the wall (n, 6), see `films_of`."""
+    drag: Samples  #: Resistance of both links against the seven rates at phase 0 of the tail (7, 7).
+    wall: Samples  #: The channel's wall (4,), see `films_of`.
+    spots: Samples  #: Rings that may near the wall (n, 6), see `films_of`.
 
     @property
     def data(self) -> Samples:

@@ -25,13 +25,10 @@ from spirillum.progress import Progress, tell
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
 _FIRST = 1e-4  # first step over the time of a turn
-END_OF_CHANNEL = "end of the channel"
-"""Event of a robot whose nose or tail reaches the end of its channel."""
+END_OF_CHANNEL = "end of the channel"  #: Event of a robot whose nose or tail reaches the end of its channel.
 _STUCK = "no step is small enough"
-INTERRUPTED = "interrupted"
-"""The event of a run that was interrupted, which keeps what was done."""
-BATTERY_EMPTY = "battery empty"
-"""Event after which the battery drives no longer."""
+INTERRUPTED = "interrupted"  #: The event of a run that was interrupted, which keeps what was done.
+BATTERY_EMPTY = "battery empty"  #: Event after which the battery drives no longer.
 
 
 class Event(NamedTuple):
@@ -44,43 +41,30 @@ class Event(NamedTuple):
 class Reach(NamedTuple):
     """What ends a run, or its drive; by default nothing does."""
 
-    nose: float = 0.0
-    """Position of the nose's tip on the motor axis, m."""
-    tip: float = 0.0
-    """Position of the tail's tip, m."""
-    channel: float = np.inf
-    """Half the channel's length, m; infinite without one."""
-    middle: float = 0.0
-    """Position of the channel's middle, m."""
-    charge: float = np.inf
-    """Charge of the battery, A s; infinite without a rating."""
+    nose: float = 0.0  #: Position of the nose's tip on the motor axis, m.
+    tip: float = 0.0  #: Position of the tail's tip, m.
+    channel: float = np.inf  #: Half the channel's length, m; infinite without one.
+    middle: float = 0.0  #: Position of the channel's middle, m.
+    charge: float = np.inf  #: Charge of the battery, A s; infinite without a rating.
 
 
 class Checkpoint(NamedTuple):
     """Where a run can be continued exactly."""
 
-    time: float
-    """Beginning of its last step, s."""
-    step: float
-    """Length of that step, s."""
-    state: tuple[float, ...]
-    """The state there, (19,)."""
+    time: float  #: Beginning of its last step, s.
+    step: float  #: Length of that step, s.
+    state: tuple[float, ...]  #: The state there, (19,).
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """A run at its samples; SI."""
 
-    time: Samples
-    """s, (n,)."""
-    duty: Samples
-    """Duty of the drive up to each sample, (n,)."""
-    states: Samples
-    """States, `State` of csrc/links.h, (n, 19)."""
-    observed: Samples
-    """What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 31) observes."""
-    events: tuple[Event, ...]
-    """What happened, in the order of time."""
+    time: Samples  #: s, (n,).
+    duty: Samples  #: Duty of the drive up to each sample, (n,).
+    states: Samples  #: States, `State` of csrc/links.h, (n, 19).
+    observed: Samples  #: What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 31) observes.
+    events: tuple[Event, ...]  #: What happened, in the order of time.
     last: Checkpoint
 
     def require_completion(self) -> Trajectory:

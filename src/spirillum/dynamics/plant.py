@@ -50,8 +50,7 @@ from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, as_given, parse_option
 
-_LONGEST = 1e6
-"""The longest step, s."""
+_LONGEST = 1e6  # The longest step, s.
 _TURN = 2.0 * np.pi
 
 
@@ -61,10 +60,8 @@ class Snapshot:
 
     time: float
     pose: RobotPose
-    values: dict[str, float]
-    """Quantities by name, SI; NaN where one has no value."""
-    ended: str
-    """Why the run ended, in half a sentence; empty while it continues."""
+    values: dict[str, float]  #: Quantities by name, SI; NaN where one has no value.
+    ended: str  #: Why the run ended, in half a sentence; empty while it continues.
 
 
 @dataclass(frozen=True)
@@ -73,21 +70,14 @@ class PlantState:
 
     time: float
     state: tuple[float, ...]
-    duty: float
-    """Duty of the last step, which the drive has."""
-    command: float
-    """Duty of the next step if none is given."""
-    flow: float | None
-    """Mean flow that is imposed, m/s; None: none is."""
-    field: TurningField | None
-    """Field that turns the robot; None for another drive."""
+    duty: float  #: Duty of the last step, which the drive has.
+    command: float  #: Duty of the next step if none is given.
+    flow: float | None  #: Mean flow that is imposed, m/s; None: none is.
+    field: TurningField | None  #: Field that turns the robot; None for another drive.
     spent: bool
-    ended: str
-    """Why the run has ended; empty while it continues."""
-    azimuth: float
-    """Azimuth counted over whole turns, rad."""
-    checkpoint: Checkpoint | None
-    """Beginning of the integrator's last step."""
+    ended: str  #: Why the run has ended; empty while it continues.
+    azimuth: float  #: Azimuth counted over whole turns, rad.
+    checkpoint: Checkpoint | None  #: Beginning of the integrator's last step.
     model: str
 
 

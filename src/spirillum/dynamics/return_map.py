@@ -37,40 +37,30 @@ STEPS = ("time", "x", "roll", "gap", "azimuth", "pitch", "yaw", "contact_force",
 
 _SIZES = np.array([1.0, 0.1, 100.0, 1.0])
 """Weights of azimuth (rad), logarithm of the gap, pitch (rad) and yaw (rad) in the size of a change."""
-_LONGEST = np.array([0.3, 1.0, 0.05, 0.1])
-"""Longest steps of the search."""
-_ROUNDS, _FIRST_TURNS = 25, 4.0
-"""Steps of the search at most; turns of the tail that the first one is over."""
-_GROWTH = (0.25, 10.0)
-"""By what the turns that a step is over are multiplied at least and at most."""
+_LONGEST = np.array([0.3, 1.0, 0.05, 0.1])  # Longest steps of the search.
+_ROUNDS, _FIRST_TURNS = 25, 4.0  #: Steps of the search at most; turns of the tail that the first one is over.
+_GROWTH = (0.25, 10.0)  # By what the turns that a step is over are multiplied at least and at most.
 _STILL, _SMALLEST, _SMALL = 1e-8, 2e-4, 2e-2
 """Size of a turn's change below which nothing changes at all; of a step of Newton's method that is the last; of a step
 after which no turn is needed for what dies out within one."""
-_APART = 0.01 * _LONGEST
-"""Distances from a fixed point at which its multiplier is measured."""
-_LITTLE = 1e-6
-"""Differences of a state's components over their sizes and the gap."""
+_APART = 0.01 * _LONGEST  # Distances from a fixed point at which its multiplier is measured.
+_LITTLE = 1e-6  # Differences of a state's components over their sizes and the gap.
 ACTING = (
     *(core.STATE_POSITION + 1, core.STATE_POSITION + 2),
     *range(core.STATE_ATTITUDE, core.STATE_ATTITUDE + 4),
     *(core.STATE_PHASE, core.STATE_CURRENT),
 )
 """Components of the state on which the rates depend: position across the tube, attitude, tail phase, current."""
-_TAIL, _ANGLES = 4, [0, 4, 5]
-"""Where a chart has the angle of the tail, and angles that are the same after a turn."""
+_TAIL, _ANGLES = 4, [0, 4, 5]  #: Where a chart has the angle of the tail, and angles that are the same after a turn.
 
 
 class Turn(NamedTuple):
     """What a turn of the tail does."""
 
-    state: Samples
-    """The state after it, (19,); path, roll, works and charge count from its start."""
-    time: float
-    """How long it takes, s."""
-    steps: Samples
-    """What is in `STEPS` at each step, all from the start of the turn, (n, 9)."""
-    tangent: Samples
-    """Derivative of what acts (`ACTING`) after `time` by that at its start, (8, 8)."""
+    state: Samples  #: The state after it, (19,); path, roll, works and charge count from its start.
+    time: float  #: How long it takes, s.
+    steps: Samples  #: What is in `STEPS` at each step, all from the start of the turn, (n, 9).
+    tangent: Samples  #: Derivative of what acts (`ACTING`) after `time` by that at its start, (8, 8).
 
 
 class EndedTurnError(InputError):
@@ -87,10 +77,8 @@ class ReturnMap:
     """Turns of the tail of one robot with its drive on."""
 
     robot: TubeRobot
-    sign: float
-    """Sense in which the tail turns in the lab."""
-    tolerance: float = TubeRobot.tolerance
-    """Error of a step over the sizes of the state's components."""
+    sign: float  #: Sense in which the tail turns in the lab.
+    tolerance: float = TubeRobot.tolerance  #: Error of a step over the sizes of the state's components.
     steps: list[int] = field(default_factory=lambda: [0])
     """Number of steps that were taken, shared with maps of other tolerances."""
 
@@ -188,12 +176,9 @@ def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:
 class FixedPoint(NamedTuple):
     """A fixed point of the return map, in a tube without gravity up to its azimuth."""
 
-    turn: Turn
-    """The turn from there."""
-    state: Samples
-    """The state at its start, (19,)."""
-    multiplier: complex
-    """By what a small distance from it is multiplied in a turn, after some turns."""
+    turn: Turn  #: The turn from there.
+    state: Samples  #: The state at its start, (19,).
+    multiplier: complex  #: By what a small distance from it is multiplied in a turn, after some turns.
 
 
 def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint | None:
@@ -234,14 +219,10 @@ def _multiplier(chart: _Chart, found: _Change, free: np.ndarray) -> complex:
 class _Change(NamedTuple):
     """A turn from coordinates."""
 
-    x: Samples
-    """Coordinates of the pose, (4,)."""
-    turn: Turn
-    """The turn from there."""
-    change: Samples
-    """What it changes, (4,)."""
-    derivative: Samples
-    """Derivative of the coordinates after it by those at its start, (4, 4)."""
+    x: Samples  #: Coordinates of the pose, (4,).
+    turn: Turn  #: The turn from there.
+    change: Samples  #: What it changes, (4,).
+    derivative: Samples  #: Derivative of the coordinates after it by those at its start, (4, 4).
 
 
 def _continued(chart: _Chart, x: Samples, free: np.ndarray, turns: float) -> _Change | None:

@@ -61,14 +61,11 @@ class Field(Options):
     argument: ClassVar[str] = "field"
     prefixed: ClassVar[bool] = True
 
-    rotation_rate: Rate | None = None
-    """Rotation rate of the field about its axis."""
+    rotation_rate: Rate | None = None  #: Rotation rate of the field about its axis.
     yaw: Yaw | None = None
     """Angle to +y of the field's axis of rotation, up to 45 degrees; along the lab's +x without it."""
-    pitch: Pitch | None = None
-    """Elevation of that axis from the horizontal."""
-    strength: MagneticField | None = None
-    """Flux density, at right angles to the axis."""
+    pitch: Pitch | None = None  #: Elevation of that axis from the horizontal.
+    strength: MagneticField | None = None  #: Flux density, at right angles to the axis.
 
 
 @dataclass(frozen=True)
@@ -77,12 +74,9 @@ class TurningField:
 
     rotation_rate: float
     strength: float
-    yaw: float = 0.0
-    """Of the axis, rad."""
-    pitch: float = 0.0
-    """Of the axis, rad."""
-    phase: float = 0.0
-    """Angle at time 0 at this rate, from up, rad."""
+    yaw: float = 0.0  #: Of the axis, rad.
+    pitch: float = 0.0  #: Of the axis, rad.
+    phase: float = 0.0  #: Angle at time 0 at this rate, from up, rad.
 
     @classmethod
     def of(cls, links: FreeRobot) -> TurningField | None:
@@ -127,13 +121,10 @@ def in_tilted_field(links: _A, requested: Field) -> _A:
     return own.changed(requested, 0.0).on(links)
 
 
-_TILT = 0.1
-"""Angle by which the robot is pushed before every rate, rad: else it could stay in an unstable balance."""
+_TILT = 0.1  # Angle by which the robot is pushed before every rate, rad: else it could stay in an unstable balance.
 _SAMPLES = 64
-_SETTLED = 1e-3
-"""Largest relative change of the velocity from one stretch to the next."""
-_STILL = 1e-4
-"""Largest change of the wobble from one stretch to the next, rad."""
+_SETTLED = 1e-3  # Largest relative change of the velocity from one stretch to the next.
+_STILL = 1e-4  # Largest change of the wobble from one stretch to the next, rad.
 _MOST_STRETCHES = 25
 _MOST_RATES = 2000
 _MOST_WORK = 3e7
@@ -143,16 +134,13 @@ _MOST_WORK = 3e7
 class _Mean(NamedTuple):
     """Averages over one stretch of a run at one rate."""
 
-    forward_velocity: float
-    """Along the axis of the field, m/s."""
+    forward_velocity: float  #: Along the axis of the field, m/s.
     tail_rotation_rate: float
     wobble_angle: float
     least_wobble_angle: float
     largest_wobble_angle: float
-    phase_lag: float
-    """NaN where the robot slips."""
-    state: Samples
-    """At the end."""
+    phase_lag: float  #: NaN where the robot slips.
+    state: Samples  #: At the end.
 
     @property
     def follows(self) -> bool:

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 _WHAT = "a run written by `spirillum simulate`"
 
-_LARGEST = 1e9
-"""Largest number of a run that is taken: SI, such as m, s, rad or rad/s."""
+_LARGEST = 1e9  # Largest number of a run that is taken: SI, such as m, s, rad or rad/s.
 
 
 def open_run(path: str | Path) -> xr.Dataset:
@@ -108,20 +107,16 @@ def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, A
     return found
 
 
-_BY_NAME = ("calibration",)
-"""Fields that hold sections by names of the user's."""
+_BY_NAME = ("calibration",)  # Fields that hold sections by names of the user's.
 _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class RobotPose(NamedTuple):
     """A robot at one moment."""
 
-    position: Samples
-    """(3,) the body's mid-length in the lab, m."""
-    attitude: Samples
-    """(4,) unit quaternion w, x, y, z from the body's axes to the lab's."""
-    tail_phase: float
-    """Angle of the tail against the body, positive about +x, rad."""
+    position: Samples  #: (3,) the body's mid-length in the lab, m.
+    attitude: Samples  #: (4,) unit quaternion w, x, y, z from the body's axes to the lab's.
+    tail_phase: float  #: Angle of the tail against the body, positive about +x, rad.
 
     @property
     def body(self) -> Samples:
@@ -162,12 +157,9 @@ class Poses:
 
     time: Samples
     position: Samples
-    attitude: Samples
-    """(n, 4) unit quaternions without jumps of sign."""
-    tail_phase: Samples
-    """(n,) not wrapped, rad."""
-    roll: Samples
-    """(n,) angle by which the body has turned about its axis, not wrapped, rad."""
+    attitude: Samples  #: (n, 4) unit quaternions without jumps of sign.
+    tail_phase: Samples  #: (n,) not wrapped, rad.
+    roll: Samples  #: (n,) angle by which the body has turned about its axis, not wrapped, rad.
 
     @property
     def duration(self) -> float:

@@ -121,8 +121,7 @@ def _in_the_tube(dataset: xr.Dataset) -> dict[str, Any]:
     return {"in_tube": found}
 
 
-_MOST_ALIKE = 4
-"""Events of one kind that are listed one by one."""
+_MOST_ALIKE = 4  # Events of one kind that are listed one by one.
 
 
 class MergedEvent(NamedTuple):
@@ -131,8 +130,7 @@ class MergedEvent(NamedTuple):
     time: float
     what: str
     times: int
-    last: float
-    """When for the last time, s."""
+    last: float  #: When for the last time, s.
 
 
 def merged_events(events: Sequence[tuple[float, str]]) -> list[MergedEvent]:
@@ -149,12 +147,9 @@ def merged_events(events: Sequence[tuple[float, str]]) -> list[MergedEvent]:
     return sorted(found)
 
 
-_WITHIN = 0.01
-"""Relative difference from the end of a stretch below which a motion is steady."""
-_LEAST_TURNS = 2
-"""Turns for which a motion that changes within a turn has to be steady."""
-_SINKS = 0.2
-"""Ratio of vertical to horizontal displacement from which on a robot is reported to sink or rise."""
+_WITHIN = 0.01  # Relative difference from the end of a stretch below which a motion is steady.
+_LEAST_TURNS = 2  # Turns for which a motion that changes within a turn has to be steady.
+_SINKS = 0.2  # Ratio of vertical to horizontal displacement from which on a robot is reported to sink or rise.
 STEADY = (
     "from the time on at which speed and tail rate (of a free run: averaged over a turn of the tail) stay within 1 % "
     "of what they are at the end of their time on at constant duty, for at least half of that time (and two turns)"

@@ -47,12 +47,10 @@ _PHASES = 8
 class LubricationFilm(NamedTuple):
     """What the fluid does to a level robot that swims at one gap, held to its course; SI, means over phases."""
 
-    gap: float
-    """Smallest distance of body and wall, m."""
+    gap: float  #: Smallest distance of body and wall, m.
     normal_resistance: float
     """Resistance to sinking of a robot that is free along the tube and in its body's rotation, N s/m."""
-    sideways_force: float
-    """Along the wall, towards a positive azimuth, N."""
+    sideways_force: float  #: Along the wall, towards a positive azimuth, N.
 
 
 def film_at(motion: Prediction, table: TubeTable, gap: float, offset: float) -> LubricationFilm:
@@ -78,24 +76,18 @@ def lubrication_resistance(viscosity: float, length: float, radius: float, tube_
     return float(3.0 * np.sqrt(2.0) * np.pi * viscosity * length * (curvature * gap) ** -1.5)
 
 
-_SHARE = 0.2
-"""Gap until which drainage is timed over that at the start, where none is given."""
-_TURNS = 30
-"""Turns of the tail that the path shows at least."""
-_FILMS = 5
-"""Gaps at which the film is stated."""
-_SAMPLES = 400
-"""Samples of the trajectory in an answer."""
+_SHARE = 0.2  # Gap until which drainage is timed over that at the start, where none is given.
+_TURNS = 30  # Turns of the tail that the path shows at least.
+_FILMS = 5  # Gaps at which the film is stated.
+_SAMPLES = 400  # Samples of the trajectory in an answer.
 
 
 @dataclass(frozen=True, repr=False)
 class Settling(DisplayMixin):
     """Settling of a robot, SI; azimuths about +x from the lowest point of the tube."""
 
-    prediction: Prediction
-    """The steady motion that it reaches, means over a turn of the tail."""
-    until: float
-    """Gap to which the drainage is timed, m."""
+    prediction: Prediction  #: The steady motion that it reaches, means over a turn of the tail.
+    until: float  #: Gap to which the drainage is timed, m.
     films: tuple[LubricationFilm, ...]
     """The film under the level robot, at gaps from the start to `until`; none where it starts on the axis."""
     _free: FreeMotion = field(repr=False)

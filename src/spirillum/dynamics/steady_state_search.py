@@ -18,12 +18,10 @@ from spirillum.kernels import core
 from spirillum.progress import Progress
 from spirillum.swimming.released_motion import State, SteadyState
 
-_MOST_TURNS = 300
-"""Turns that are followed at most."""
+_MOST_TURNS = 300  # Turns that are followed at most.
 _SEARCHES = (10, *range(30, _MOST_TURNS + 1, 30))
 """Turns after which the fixed point of the return map is searched for."""
-STABLE = 1.0 + 1e-4
-"""Largest multiplier of a motion that stays where it is."""
+STABLE = 1.0 + 1e-4  #: Largest multiplier of a motion that stays where it is.
 _PLACES = {name: place for place, name in enumerate(STEPS)}
 
 
@@ -75,16 +73,11 @@ class Path:
 class LongRun(NamedTuple):
     """A run and its asymptotic motion."""
 
-    path: Path
-    """The run that was followed."""
-    turn: Turn
-    """The last turn: of the asymptotic motion, where one was found."""
-    start: Samples
-    """The state at the start of `time`, (19,)."""
-    time: float
-    """Time from then on over which means are taken, s: that turn; around the tube, the last circuit."""
-    lying: SteadyState
-    """Its pose over that time."""
+    path: Path  #: The run that was followed.
+    turn: Turn  #: The last turn: of the asymptotic motion, where one was found.
+    start: Samples  #: The state at the start of `time`, (19,).
+    time: float  #: Time from then on over which means are taken, s: that turn; around the tube, the last circuit.
+    lying: SteadyState  #: Its pose over that time.
 
 
 def long_run(

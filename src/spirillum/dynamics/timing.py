@@ -18,22 +18,19 @@ from spirillum.robot.arguments import Options
 from spirillum.scalars import is_number, is_whole
 from spirillum.units import KINDS, parse_option
 
-DUTY_COLUMNS = ("time_s", "duty")
-"""Columns of a duty file; each row holds until the next one."""
+DUTY_COLUMNS = ("time_s", "duty")  #: Columns of a duty file; each row holds until the next one.
 _WHAT = "a duty file (CSV with the columns time_s and duty)"
 _LARGEST = 64 << 20
 _LIMITS = dict(zip(DUTY_COLUMNS, ((0.0, 1e9), (0.0, 1.0)), strict=True))
 
-Window = tuple[float, float]
-"""Start and stop of a time in which the motor is on, s."""
+Window = tuple[float, float]  #: Start and stop of a time in which the motor is on, s.
 
 
 class Switch(NamedTuple):
     """From a time on, s, the drive has a duty."""
 
     time: float
-    duty: float
-    """0 (off) to 1 (full throttle)."""
+    duty: float  #: 0 (off) to 1 (full throttle).
 
 
 def windows_of(on: Sequence[tuple[str | float, str | float]] | None) -> list[Window] | None:
@@ -81,14 +78,11 @@ def read_duty(path: str | Path) -> list[Switch]:
     return switches if switches[0].time == 0 else [Switch(0.0, 0.0), *switches]
 
 
-TRIAL_DURATION = 20.0
-"""Length of a run in a tube, and of a trial, where none is given, s."""
+TRIAL_DURATION = 20.0  #: Length of a run in a tube, and of a trial, where none is given, s.
 _LARGEST_SAMPLES = 1_000_000
 _MOST_A_TURN = 10_000
-_SHORTEST = 1e-6
-"""Shortest run, in turns."""
-_ROUNDING = 1e-9
-"""Difference of two times that is rounding, over the distance of two samples."""
+_SHORTEST = 1e-6  # Shortest run, in turns.
+_ROUNDING = 1e-9  # Difference of two times that is rounding, over the distance of two samples.
 
 
 def stated_duration(turns: float, duration: str | float | None) -> float | None:
@@ -142,14 +136,10 @@ _NONE = type(None)
 class Timetable(NamedTuple):
     """Times of one run."""
 
-    end: float
-    """Length of the run, s."""
-    time: Samples
-    """Evenly spaced samples from 0 to the end, s."""
-    switches: list[Switch]
-    """Every switching of the remote, the first at 0."""
-    notes: list[Note]
-    """Where the schedule of the remote and the run do not meet, a sentence each."""
+    end: float  #: Length of the run, s.
+    time: Samples  #: Evenly spaced samples from 0 to the end, s.
+    switches: list[Switch]  #: Every switching of the remote, the first at 0.
+    notes: list[Note]  #: Where the schedule of the remote and the run do not meet, a sentence each.
 
 
 class Timing(Options):
@@ -163,8 +153,7 @@ class Timing(Options):
         str | float | None, _of_kind("duration", (_NONE, str, float), "a time, as in 2 s, or a float in s")
     ] = None
     """Length of the run in time instead, with its unit (``"2 s"``) or a float in s."""
-    samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100
-    """Samples of the output per turn."""
+    samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100  #: Samples of the output per turn.
     on: Annotated[Sequence[Window] | None, BeforeValidator(windows_of)] = None
     """Times (start, stop) between which the remote switches the drive on, with unit (``"2 s"``) or floats in s; None:
     on throughout."""

@@ -61,8 +61,7 @@ _POSE = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "azimuth":
 _OF_ONE_POSE = ("hydrodynamic_efficiency", "propulsive_power", "overall_efficiency")
 """Quantities that a trial does not have."""
 _MANY_POSES = "they follow from the body's drag at one pose, and a trial passes through many"
-_MOST_TURNS = 2000
-"""Turns of the tail that a trial may take beside an answer."""
+_MOST_TURNS = 2000  # Turns of the tail that a trial may take beside an answer.
 
 
 def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, placement: Placement) -> str:
@@ -119,28 +118,21 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     return ReleasedMotion(values, basis)
 
 
-RUNS = 64
-"""Runs over the unknowns: a power of two, at which Sobol' points fill space evenly."""
-_SEED = 36
-"""Of the scrambling: with it the unknowns of 64 points correlate by less than 0.04."""
-LEVEL = 0.9
-"""Level of the interval over the unknowns."""
+RUNS = 64  #: Runs over the unknowns: a power of two, at which Sobol' points fill space evenly.
+_SEED = 36  # Of the scrambling: with it the unknowns of 64 points correlate by less than 0.04.
+LEVEL = 0.9  #: Level of the interval over the unknowns.
 _AXIAL, _RADIAL = "body.center_of_mass.x", "body.center_of_mass.radial"
-_FEWEST = 0.5
-"""Share of the runs that have to swim."""
+_FEWEST = 0.5  # Share of the runs that have to swim.
 
 
 class TrialUnknown(NamedTuple):
     """An unknown of a trial, with an assumed distribution between two bounds."""
 
-    name: str
-    """`wait`, or the field that it replaces, or is added to."""
-    kind: Literal["uniform", "log-uniform"]
-    """Shape of the distribution."""
+    name: str  #: `wait`, or the field that it replaces, or is added to.
+    kind: Literal["uniform", "log-uniform"]  #: Shape of the distribution.
     low: float
     high: float
-    of: str
-    """What the ends are multiples of, or their unit."""
+    of: str  #: What the ends are multiples of, or their unit.
     source: str
 
     def at(self, shares: Samples) -> Samples:
@@ -169,8 +161,7 @@ class TrialSample(NamedTuple):
     wait: float | None
     roughness: float | None
     friction_coefficient: float | None
-    draw: int | None = None
-    """Number of the draw of a posterior whose values the robot has; None without one."""
+    draw: int | None = None  #: Number of the draw of a posterior whose values the robot has; None without one.
 
 
 def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> tuple[TrialUnknown, ...]:
@@ -289,10 +280,8 @@ def _shares(unknowns: Sequence[TrialUnknown]) -> Samples:
     return points[:, [UNKNOWNS.index(one) for one in unknowns]]
 
 
-_TOLERANCE = 1e-4
-"""Error of a time step of the runs over the unknowns: their speeds are accurate to a thousandth."""
-_SAMPLES_PER_TURN = 12
-"""Samples over which their means are taken."""
+_TOLERANCE = 1e-4  # Error of a time step of the runs over the unknowns: their speeds are accurate to a thousandth.
+_SAMPLES_PER_TURN = 12  # Samples over which their means are taken.
 
 
 def quick_run(
@@ -322,8 +311,7 @@ class TrialRequest:
     placement: Placement | Mapping[str, Any] | None
     roughness: str | float | None
     in_tube: InTube
-    duration: float | None
-    """Of the trial, s; None: that of a run by its defaults."""
+    duration: float | None  #: Of the trial, s; None: that of a run by its defaults.
     interval: bool
     progress: Progress | None
     posterior_for: PosteriorFor = "new"  #: Whose discrepancy the interval holds, with a posterior.

@@ -21,8 +21,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 
-TRIAL_WAIT = 60.0
-"""Default time from release until the motor is switched on, s; assumed."""
+TRIAL_WAIT = 60.0  #: Default time from release until the motor is switched on, s; assumed.
 FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
 _WHAT = "a flow file (CSV with the columns time_s and flow_mm_s)"
@@ -71,10 +70,8 @@ class Release(NamedTuple):
 
     placement: Placement
     in_tube: InTube
-    roughness: float | None = None
-    """Height of the asperities, m; None: 1e-4 of the body's radius."""
-    weight: bool = True
-    """Whether weight and buoyancy act."""
+    roughness: float | None = None  #: Height of the asperities, m; None: 1e-4 of the body's radius.
+    weight: bool = True  #: Whether weight and buoyancy act.
 
     @classmethod
     def of(

@@ -29,24 +29,19 @@ FRICTION_COEFFICIENT = 0.1
 _SLIDING_SHARE = 1e-4
 """Sliding speed below which dry friction is made smooth, over that of a body turning as fast as the tail."""
 _STATIONS_PER_TURN = 24
-_LINE_STATIONS_PER_TURN = 64
-"""Where the wire is a cubic between them: off by less than a millionth of the amplitude."""
+_LINE_STATIONS_PER_TURN = 64  # Where the wire is a cubic between them: off by less than a millionth of the amplitude.
 
 
 @dataclass(frozen=True)
 class Surroundings:
     """What surrounds a robot in its tube."""
 
-    ends: int = core.CLOSED
-    """`kernel.CLOSED`, `kernel.OPEN` or `kernel.IMPOSED`."""
-    length: float = np.inf
-    """L_eff of open ends, m."""
+    ends: int = core.CLOSED  #: `kernel.CLOSED`, `kernel.OPEN` or `kernel.IMPOSED`.
+    length: float = np.inf  #: L_eff of open ends, m.
     flow: Samples = field(default_factory=lambda: np.zeros((1, 2)))
     """Imposed mean flow: times, s, and velocities, m/s, (k, 2); straight between them, constant beyond."""
-    roughness: float | None = None
-    """Height of the asperities, m; None: `ROUGHNESS_SHARE` of the body's radius."""
-    coefficient: float = FRICTION_COEFFICIENT
-    """Coefficient of dry friction, 1."""
+    roughness: float | None = None  #: Height of the asperities, m; None: `ROUGHNESS_SHARE` of the body's radius.
+    coefficient: float = FRICTION_COEFFICIENT  #: Coefficient of dry friction, 1.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,18 +54,12 @@ class TubeRobot(FreeRobot):
     """
     observed: ClassVar[int] = core.SEEN_SIZE
 
-    tube: Samples
-    """The tube (9,), see `kernels.tube_motion`."""
-    wire: Samples
-    """The wire, `Wire` of csrc/contacts.h, (6,)."""
-    sites: Samples
-    """Sites of body and coupling that can touch, `Site`, (n, 5)."""
-    stations: Samples
-    """Stations along the wires, `Station`, (m, 8)."""
-    flow: Samples
-    """Imposed mean flow (k, 2)."""
-    names: tuple[str, ...]
-    """Names of the sites, and of the tail."""
+    tube: Samples  #: The tube (9,), see `kernels.tube_motion`.
+    wire: Samples  #: The wire, `Wire` of csrc/contacts.h, (6,).
+    sites: Samples  #: Sites of body and coupling that can touch, `Site`, (n, 5).
+    stations: Samples  #: Stations along the wires, `Station`, (m, 8).
+    flow: Samples  #: Imposed mean flow (k, 2).
+    names: tuple[str, ...]  #: Names of the sites, and of the tail.
 
     @property
     def data(self) -> Samples:

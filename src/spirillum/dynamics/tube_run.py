@@ -24,17 +24,12 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-ENDS = {core.CLOSED: "closed", core.OPEN: "open", core.IMPOSED: "imposed flow"}
-"""Ends of the channel in words."""
+ENDS = {core.CLOSED: "closed", core.OPEN: "open", core.IMPOSED: "imposed flow"}  #: Ends of the channel in words.
 
-_FEWEST = 2
-"""Moments of the shortest run."""
-_UNIT = 1e-6
-"""Error of a quaternion's length that is rounding."""
-_MOST = 1e9
-"""Largest number of a checkpoint that is taken, SI."""
-_ASIDE = 1e-3
-"""Largest distance of a checkpoint's position from the samples around it, beyond the path of the run, m."""
+_FEWEST = 2  # Moments of the shortest run.
+_UNIT = 1e-6  # Error of a quaternion's length that is rounding.
+_MOST = 1e9  # Largest number of a checkpoint that is taken, SI.
+_ASIDE = 1e-3  # Largest distance of a checkpoint's position from the samples around it, beyond the path of the run, m.
 
 
 def tube_run(

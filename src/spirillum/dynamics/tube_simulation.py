@@ -132,8 +132,7 @@ def _number(dataset: xr.Dataset, name: str) -> float:
         ) from error
 
 
-_STARTS = ("gap", "eccentricity", "pitch", "yaw")
-"""Fields of a placement that define the initial pose."""
+_STARTS = ("gap", "eccentricity", "pitch", "yaw")  # Fields of a placement that define the initial pose.
 _POSES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
 """Where a run names a missing table."""
 
@@ -265,12 +264,9 @@ def _around(robot: Robot, release: Release) -> Surroundings:
 class Checked(NamedTuple):
     """Effect of the stated error of a table on a motion."""
 
-    known: bool
-    """Whether the motion keeps to yaws at which the table was checked."""
-    near: bool
-    """Whether it comes nearer to the glass than where the flow around a whole robot was solved for."""
-    notes: list[Note]
-    """Cautions about both, a sentence each."""
+    known: bool  #: Whether the motion keeps to yaws at which the table was checked.
+    near: bool  #: Whether it comes nearer to the glass than where the flow around a whole robot was solved for.
+    notes: list[Note]  #: Cautions about both, a sentence each.
 
 
 def compare_with_check(

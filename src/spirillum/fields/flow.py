@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-FLOW_MODELS = ("slender", "tube")
-"""The models whose tractions give a flow: in unbounded fluid, and in the channel."""
+FLOW_MODELS = ("slender", "tube")  #: The models whose tractions give a flow: in unbounded fluid, and in the channel.
 Frame = Literal["lab", "body"]
 _MOTION = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
 
@@ -52,8 +51,7 @@ class Flow(DisplayMixin):
     """
 
     prediction: Prediction
-    field: FluidField = repr_field(repr=False)
-    """The flow in the lab frame."""
+    field: FluidField = repr_field(repr=False)  #: The flow in the lab frame.
     phase: float
     frame: Frame
     """`lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the forward velocity)."""

@@ -120,12 +120,9 @@ def add_tractions(
 class FlowField(FluidField):
     """Flow at one instant in fluid that is at rest far away, SI."""
 
-    solution: UnitTwistSolution = field(repr=False)
-    """Tractions for unit twists, at phase 0."""
-    solids: tuple[tuple[str, Outline], ...]
-    """Names and outlines of the solids of revolution."""
-    twists: Samples
-    """Velocity and rotation of body, then of rotor, (12,)."""
+    solution: UnitTwistSolution = field(repr=False)  #: Tractions for unit twists, at phase 0.
+    solids: tuple[tuple[str, Outline], ...]  #: Names and outlines of the solids of revolution.
+    twists: Samples  #: Velocity and rotation of body, then of rotor, (12,).
     phase: float
     viscosity: float
 

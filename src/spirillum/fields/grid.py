@@ -35,8 +35,7 @@ _WIDEST = 1.5  # a tube that is shown whole, over the box around the robot
 class PointGrid:
     """Evenly spaced points along x, y, z, m; an axis with one point is the position of a plane."""
 
-    axes: tuple[Samples, Samples, Samples]
-    """Coordinates along x, y, z."""
+    axes: tuple[Samples, Samples, Samples]  #: Coordinates along x, y, z.
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -29,16 +29,12 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import TubePose
 
-_DECAY = 2.5
-"""Rate, times the radius, at which the flow of a force at least dies out along the tube."""
+_DECAY = 2.5  # Rate, times the radius, at which the flow of a force at least dies out along the tube.
 _TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From body axes to those of the solution: x along the robot, y up, z to the right."""
-_FADE = 1.25
-"""Steepest wave over that which matters: between them waves are faded out."""
-_CANCEL = 4.0
-"""Multiple of that range beyond which the waves of forces cancel."""
-_SHARES = 8
-"""Consecutive waves are distributed over the cores: flat ones cost most."""
+_FADE = 1.25  # Steepest wave over that which matters: between them waves are faded out.
+_CANCEL = 4.0  # Multiple of that range beyond which the waves of forces cancel.
+_SHARES = 8  # Consecutive waves are distributed over the cores: flat ones cost most.
 
 
 @dataclass(frozen=True)
@@ -48,15 +44,11 @@ class TubeFlowField(FluidField):
     The pressure is that above the mean of both ends of a tube in whose middle the body lies.
     """
 
-    held: Held = field(repr=False)
-    """Tractions for unit motions, at this phase, viscosity 1."""
-    seat: TubePose
-    """The tube and the robot's pose in it."""
+    held: Held = field(repr=False)  #: Tractions for unit motions, at this phase, viscosity 1.
+    seat: TubePose  #: The tube and the robot's pose in it.
     solids: tuple[tuple[str, Outline], ...]
-    twists: Samples
-    """Velocity and rotation of body, then of rotor, (12,)."""
-    mean_flow: float
-    """Mean velocity of the fluid through the tube, m/s."""
+    twists: Samples  #: Velocity and rotation of body, then of rotor, (12,).
+    mean_flow: float  #: Mean velocity of the fluid through the tube, m/s.
     viscosity: float
 
     def part_at(self, points: Samples) -> np.ndarray:
@@ -144,8 +136,7 @@ class _Sources(NamedTuple):
     rho: Samples
     angle: Samples
     x: Samples
-    forces: Samples
-    """Even and odd part, along x, rho and the angle, (c, n, 2, 3)."""
+    forces: Samples  #: Even and odd part, along x, rho and the angle, (c, n, 2, 3).
 
     @classmethod
     def of(cls, points: Samples, forces: Samples) -> _Sources:
@@ -162,20 +153,15 @@ class _Reflection:
     """Reflection at the wall: waves and their amplitudes, see `kernels.stokes_flow`."""
 
     radius: float
-    waves: tuple[Samples, np.ndarray]
-    """k, 1/m, and number of orders p of each."""
+    waves: tuple[Samples, np.ndarray]  #: k, 1/m, and number of orders p of each.
     classes: tuple[tuple[float, Any], ...]
     """Smallest distance from the wall of a group of forces, m, twice that of the previous, and a tree of positions.
     """
-    cut: float
-    """Waves that are damped by exp(-cut) no longer matter."""
-    middle: float
-    """Between both ends of the robot, along the tube, m."""
-    reach: float
-    """Where, from there, the flow has died out, m."""
+    cut: float  #: Waves that are damped by exp(-cut) no longer matter.
+    middle: float  #: Between both ends of the robot, along the tube, m.
+    reach: float  #: Where, from there, the flow has died out, m.
     steps: Samples
-    amplitudes: Samples
-    """Of `kernels.stokes_flow.wave_amplitudes`."""
+    amplitudes: Samples  #: Of `kernels.stokes_flow.wave_amplitudes`.
 
     @classmethod
     def of(cls, strengths: Strengths, density: Amplitudes, forces: Samples) -> _Reflection:

@@ -26,25 +26,18 @@ PARTS = ("body", "coupling", "tail", "rotor", "robot")
 class ResistanceModel(ABC):
     """A model that knows the resistance of some parts of a robot."""
 
-    name: str
-    """Name on the command line."""
+    name: str  #: Name on the command line.
     title: ClassVar[str]
-    references: ClassVar[tuple[str, ...]]
-    """Keys of its references, see `spirillum.citation`."""
-    known_error: ClassVar[str]
-    """Neglected effects and their cost."""
-    parts: ClassVar[tuple[str, ...]]
-    """Parts whose matrix it can give."""
+    references: ClassVar[tuple[str, ...]]  #: Keys of its references, see `spirillum.citation`.
+    known_error: ClassVar[str]  #: Neglected effects and their cost.
+    parts: ClassVar[tuple[str, ...]]  #: Parts whose matrix it can give.
     closed_form: ClassVar[bool] = True
     """False for a model that solves for the flow, which takes a tenth of a second for each robot."""
     axial_only: ClassVar[bool] = False
     """True if the model gives only the entries along and about the motor axis; the others are NaN."""
-    form: ClassVar[str | None] = None
-    """Solution method, for a model that has more than one."""
-    error_against: str | None = None
-    """Basis of the error estimate, if that is not another resolution."""
-    placed: ClassVar[bool] = False
-    """Whether the result depends on the pose in the channel, `batch.placement`."""
+    form: ClassVar[str | None] = None  #: Solution method, for a model that has more than one.
+    error_against: str | None = None  #: Basis of the error estimate, if that is not another resolution.
+    placed: ClassVar[bool] = False  #: Whether the result depends on the pose in the channel, `batch.placement`.
 
     def stated_error(self, options: ModelOptions) -> str:
         """Neglected effects with these options, and their cost."""

@@ -26,10 +26,8 @@ from spirillum.robot.batch import RobotBatch
 _WIRE, _LENGTH, _TAPER = 1.0, 60.0, 100.0  # mm, mm, c of the envelope
 _SHAPE = ("wavelength over amplitude", "wire diameter over amplitude", "length over amplitude", "mean envelope")
 """Parameters of the tail on which its errors depend."""
-_RESOLVED = 2
-"""Number of parameters that the reference tails vary: all are 60 wire diameters long and have one taper."""
-_SAME = 1e-6
-"""Distance below which a tail is a resolved one, to rounding error."""
+_RESOLVED = 2  # Number of parameters that the reference tails vary: all are 60 wire diameters long and have one taper.
+_SAME = 1e-6  # Distance below which a tail is a resolved one, to rounding error.
 
 
 class TailError(NamedTuple):
@@ -50,8 +48,7 @@ for _row in rows_of("fluid/reference_errors.csv"):
 
 SPEED_ERRORS = {"rft": 21, "sbt": 31}
 """Errors of the speed of the reference robot, percent: the paper's tail behind a capsule, in unbounded fluid."""
-WITHOUT_INTERACTION = 14
-"""Error of that speed, percent, from leaving out the flow between body and tail alone."""
+WITHOUT_INTERACTION = 14  #: Error of that speed, percent, from leaving out the flow between body and tail alone.
 
 
 def validation_note(batch: RobotBatch, errors: Mapping[tuple[float, float], TailError]) -> str:

@@ -15,8 +15,7 @@ from spirillum.robot.placement import Placement
 
 SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender(), Tube())}
 """Models that make a robot swim."""
-MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
-"""Models that give a resistance matrix."""
+MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}  #: Models that give a resistance matrix.
 
 
 def find_model(name: str) -> ResistanceModel:

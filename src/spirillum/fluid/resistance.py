@@ -27,8 +27,7 @@ from spirillum.units import KINDS, parse_option
 
 _UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
 _BOTH = "both"
-_LINKS = ("body", "rotor")
-"""Order of the two links in a 12x12."""
+_LINKS = ("body", "rotor")  # Order of the two links in a 12x12.
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,13 +36,10 @@ class Resistance(DisplayMixin):
 
     robot: Robot
     model: ResistanceModel
-    part: str
-    """The part; `both` for body and rotor, each with a motion of its own."""
-    about: str
-    """Reference point: the body's mid-length, or the tail's root; both on the motor axis."""
+    part: str  #: The part; `both` for body and rotor, each with a motion of its own.
+    about: str  #: Reference point: the body's mid-length, or the tail's root; both on the motor axis.
     phase: float
-    placement: dict[str, Any]
-    """Assumed pose of the robot."""
+    placement: dict[str, Any]  #: Assumed pose of the robot.
     matrix: Samples
     """B, 6x6, or 12x12 for body and rotor in this order, SI; NaN where the model does not know an entry."""
     warnings: tuple[Note, ...]

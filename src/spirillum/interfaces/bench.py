@@ -57,8 +57,7 @@ class Bench(Senses):
         self._eye: VirtualCamera | None = None
         self._tracker: LiveTracker | None = None
         self._port: SerialRemote | None = None
-        self.virtual: VirtualRemote | None = None
-        """The remote of the port `virtual`."""
+        self.virtual: VirtualRemote | None = None  #: The remote of the port `virtual`.
         try:
             if tracked:
                 pose = plant.observe().pose

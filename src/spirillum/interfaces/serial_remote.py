@@ -118,8 +118,7 @@ class SerialRemote:
         """
         serial = import_optional("serial", "a remote at a serial port", "control")
         check_range("baud", baud, 1, _FASTEST)
-        self.port = str(port)
-        """The port."""
+        self.port = str(port)  #: The port.
         self._gone: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
         self._number, self._rest = 0, b""  # of the last command; bytes of a line that has not ended
         try:
@@ -330,14 +329,11 @@ class VirtualRemote:
             raise InputError("this system has no pseudo-terminals; allowed: Linux or macOS, or a real port")
         import tty
 
-        self.receiver = Receiver(name, watchdog)
-        """What is behind the port."""
+        self.receiver = Receiver(name, watchdog)  #: What is behind the port.
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
-        self.port = os.ttyname(self._far)
-        """Port of the remote."""
-        self.deaf = False
-        """Whether it hears nothing, as one out of reach."""
+        self.port = os.ttyname(self._far)  #: Port of the remote.
+        self.deaf = False  #: Whether it hears nothing, as one out of reach.
         self._plugged = True
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()

@@ -95,8 +95,7 @@ class TaskEnvironment(ABC):
             loaded, count, model=chosen, friction=friction, placement=placed, ranges=drawn, posterior=posterior
         )
         self.steps = np.zeros(count, dtype=np.int64)
-        self.length = max(1, round(self.duration / self.dt))
-        """Steps of an episode."""
+        self.length = max(1, round(self.duration / self.dt))  #: Steps of an episode.
         late, slow = round(self.lab.camera.latency / self.dt), max(1, round(_SEEN_OVER / self.dt))
         self._late, self._slow = late, slow
         self._frames, self._commands = (  # the last values of all robots, the latest last
@@ -107,8 +106,7 @@ class TaskEnvironment(ABC):
         self._wander, self._scale, self._gain = np.zeros(count), np.ones(count), np.ones(count)
         self._pulse_start, self._pulse = np.zeros(count), np.zeros(count)
         self._goal_range = _range_of("goal", self.goals if goal is None else goal)
-        self.goal = np.zeros(count)
-        """The goal of each robot, SI."""
+        self.goal = np.zeros(count)  #: The goal of each robot, SI.
 
     @property
     def count(self) -> int:

@@ -61,8 +61,7 @@ __all__ = [
 
 _SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_bool}
 _THREADS = int(os.environ.get("OMP_NUM_THREADS") or 0) or os.cpu_count() or 1
-_SHARES = 4
-"""Shares of the rows for each thread: some rows take longer than others."""
+_SHARES = 4  # Shares of the rows for each thread: some rows take longer than others.
 
 _alone: ContextVar[bool] = ContextVar("alone", default=False)
 

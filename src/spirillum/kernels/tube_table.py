@@ -58,17 +58,14 @@ def film_is_whole(film: Samples, radius: float) -> bool:
 
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
 """Sign of each of the `MOTIONS` (U and Omega of the body, omega_m of the rotor, mean flow) in a mirror to the side."""
-PARAMETERS = MOTIONS * (MOTIONS + 1) // 2
-"""Entries of a Cholesky factor."""
+PARAMETERS = MOTIONS * (MOTIONS + 1) // 2  #: Entries of a Cholesky factor.
 STEEPEST = (math.radians(12.0), math.radians(8.0))
 """Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
 YAW_SLACK = 1.1  # of the largest yaw: the tail touches the glass a little beyond it
-YAW_SHARES = (0.6, 0.8, 0.95)
-"""Yaws of yawed nodes, to both sides, over the largest one at their place."""
+YAW_SHARES = (0.6, 0.8, 0.95)  #: Yaws of yawed nodes, to both sides, over the largest one at their place.
 PHASES = 9
 """Phases that a mean is taken over: what they leave of a table's four harmonics is below 1e-6, five up to 5e-4."""
-YAW_ORDERS = 2 * len(YAW_SHARES)
-"""Powers of the stretched yaw, from the first."""
+YAW_ORDERS = 2 * len(YAW_SHARES)  #: Powers of the stretched yaw, from the first.
 
 # Header of a packed table: radius of the tube, rows, and the lengths of what follows.
 _RADIUS, _RINGS, _GAPS, _UP, _DOWN, _PHASES, _YAW_GAPS, _YAW_PITCHES = 0, 1, 2, 3, 4, 5, 6, 7
@@ -142,14 +139,10 @@ def is_whole(table: Samples, radius: float) -> bool:
 class Range(NamedTuple):
     """Where a table holds."""
 
-    gaps: Samples
-    """Gaps of a level robot at which the next three are stated, (n,), m."""
-    up: Samples
-    """Largest pitch nose up, (n,), rad."""
-    down: Samples
-    """Largest pitch nose down, positive, (n,), rad."""
-    yaw: Samples
-    """Largest yaw of a level robot to either side, (n,), rad."""
+    gaps: Samples  #: Gaps of a level robot at which the next three are stated, (n,), m.
+    up: Samples  #: Largest pitch nose up, (n,), rad.
+    down: Samples  #: Largest pitch nose down, positive, (n,), rad.
+    yaw: Samples  #: Largest yaw of a level robot to either side, (n,), rad.
 
 
 def range_of(table: Samples) -> Range:
@@ -166,14 +159,10 @@ def range_of(table: Samples) -> Range:
 class Parts(NamedTuple):
     """What a packed table is made of."""
 
-    nodes: Samples
-    """Head, rings and nodes."""
-    rest: Samples
-    """(gaps, up + down - 1, phases, 36)."""
-    yawed: Samples
-    """(yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36)."""
-    film: Samples
-    """Packed film."""
+    nodes: Samples  #: Head, rings and nodes.
+    rest: Samples  #: (gaps, up + down - 1, phases, 36).
+    yawed: Samples  #: (yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36).
+    film: Samples  #: Packed film.
 
     def packed(self) -> Samples:
         """All in one array again."""

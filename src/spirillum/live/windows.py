@@ -91,8 +91,7 @@ class CausalAngle:
 
     def __init__(self, period: float) -> None:
         self.period = period
-        self.restarts = 0
-        """How often tracking restarted, so that angles before and after are not comparable."""
+        self.restarts = 0  #: How often tracking restarted, so that angles before and after are not comparable.
         self._times: list[float] = []
         self._angles: list[float] = []
         self._value = self._at = math.nan

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from spirillum.view.figures.sheet import Picture
 
 
-Drawings = Mapping[str, "Callable[[], Figure]"]
-"""Functions that draw figures, by the names of their files."""
+Drawings = Mapping[str, "Callable[[], Figure]"]  #: Functions that draw figures, by the names of their files.
 
 
 @dataclass(frozen=True)
@@ -115,8 +114,7 @@ def _drawn(draw: Callable[[], Figure], path: Path, *, vector: bool) -> list[Path
     return save(draw(), path, vector=vector)
 
 
-_TAKEN: dict[str, Callable[[], Figure]] = {}
-"""Figures of a process that draws beside another one."""
+_TAKEN: dict[str, Callable[[], Figure]] = {}  # Figures of a process that draws beside another one.
 
 
 def _take_drawings(again: Callable[[], Drawings]) -> None:

@@ -31,10 +31,8 @@ def _colours(of: str) -> dict[Any, Colour]:
     return {row["name"]: (float(row["red"]), float(row["green"]), float(row["blue"])) for row in rows}
 
 
-STRIPE_COLOURS: dict[StripeColour, Colour] = _colours("stripe")
-"""sRGB of a stripe's colour names, 0 to 1."""
-COLOURS: dict[str, Colour] = _colours("piece")
-"""sRGB of the pieces, 0 to 1, the wire of copper; for pictures only."""
+STRIPE_COLOURS: dict[StripeColour, Colour] = _colours("stripe")  #: sRGB of a stripe's colour names, 0 to 1.
+COLOURS: dict[str, Colour] = _colours("piece")  #: sRGB of the pieces, 0 to 1, the wire of copper; for pictures only.
 _STEEL: Colour = (0.62, 0.64, 0.67)
 _WIRES = ("stub", "arm", "tail")
 _STEELS = (7000.0, 8300.0)  # densities between which a wire is taken for steel, kg/m^3: brass begins at 8400

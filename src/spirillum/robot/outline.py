@@ -21,10 +21,8 @@ class Segment:
 
     start: tuple[float, float]
     end: tuple[float, float]
-    turn: ClassVar[float] = 0.0
-    """Angle by which its tangent turns, rad."""
-    edges: ClassVar[tuple[float, ...]] = (0.0, 1.0)
-    """Parameters between which it is analytic."""
+    turn: ClassVar[float] = 0.0  #: Angle by which its tangent turns, rad.
+    edges: ClassVar[tuple[float, ...]] = (0.0, 1.0)  #: Parameters between which it is analytic.
 
     def points(self, t: Samples) -> tuple[Samples, Samples]:
         """(x, rho) at t from 0 to 1."""
@@ -56,8 +54,7 @@ class Arc:
     centre: tuple[float, float]
     semi_axes: tuple[float, float]
     angles: tuple[float, float]
-    edges: ClassVar[tuple[float, ...]] = (0.0, 1.0)
-    """Parameters between which it is analytic."""
+    edges: ClassVar[tuple[float, ...]] = (0.0, 1.0)  #: Parameters between which it is analytic.
 
     def points(self, t: Samples) -> tuple[Samples, Samples]:
         """(x, rho) at t from 0 to 1."""

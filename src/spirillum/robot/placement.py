@@ -36,14 +36,12 @@ class Placement(Options):
     argument: ClassVar[str] = "placement"
     prefixed: ClassVar[bool] = True
 
-    gap: Length | None = None
-    """Smallest distance between the body's surface and the glass."""
+    gap: Length | None = None  #: Smallest distance between the body's surface and the glass.
     eccentricity: Annotated[float | None, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = None
     """Instead of `gap`, for a level robot: offset of the body's centre over R - a, towards the floor; 0 on the axis."""
     pitch: Pitch | None = None
     """Angle by which the nose is raised, about the body's mid-length; negative for a nose that is lowered."""
-    yaw: Yaw = 0.0
-    """Angle by which the nose is turned to +y (left), about the vertical through the body's mid-length."""
+    yaw: Yaw = 0.0  #: Angle by which the nose is turned to +y (left), about the vertical through the body's mid-length.
     tail_drop: LengthOrZero = 0.0
     """Distance by which the tail's axis is lowered: a surrogate, impossible with a rigid joint."""
     ends: Ends | None = None

@@ -125,24 +125,20 @@ class CentreLine:
         else:
             self._spline = CubicSpline(self._knots, points)
         fine = np.unique(np.linspace(self._knots[:-1], self._knots[1:], _PER_GAP + 1))
-        self.samples: Samples = self._spline(fine)
-        """Points along it, dense against its bends, (k, 3), m."""
+        self.samples: Samples = self._spline(fine)  #: Points along it, dense against its bends, (k, 3), m.
         first, second = self._spline(fine, 1), self._spline(fine, 2)
         speed = np.linalg.norm(first, axis=1)
         self.arc: Samples = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(fine) * (speed[1:] + speed[:-1]))])
         """Length from the root to those, m, (k,)."""
-        self.length = float(self.arc[-1])
-        """Length of the wire, m."""
+        self.length = float(self.arc[-1])  #: Length of the wire, m.
         self.curvature = float(np.max(np.linalg.norm(np.cross(first, second), axis=1) / speed**3))
         """Largest curvature, 1/m."""
         self.amplitude = float(np.max(np.hypot(self.samples[:, 1], self.samples[:, 2])))
         """Largest distance from the axis, m."""
         self.spread = float(np.sqrt(np.sum(np.var(self.samples[:, 1:], axis=0))))
         """Root mean square distance across from its mean position, m."""
-        self.reach = float(np.max(self.samples[:, 0]))
-        """Largest axial distance from the root, m."""
-        self.nearest = float(np.min(self.samples[:, 0]))
-        """Smallest axial distance from the root, m."""
+        self.reach = float(np.max(self.samples[:, 0]))  #: Largest axial distance from the root, m.
+        self.nearest = float(np.min(self.samples[:, 0]))  #: Smallest axial distance from the root, m.
         tangents = first / speed[:, None]
         across = tangents[:, 1] + 1j * tangents[:, 2]
         winding = float(np.sum(np.angle(across[1:] * np.conj(across[:-1]), deg=False)) / (2.0 * np.pi))

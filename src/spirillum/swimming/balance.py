@@ -38,16 +38,12 @@ class TorqueBalance(NamedTuple):
     bb: Values
     br: Values
     rb: Values
-    rr: Values
-    """Torque on body (b) and rotor (r) per rate of body and rotor, N m s."""
+    rr: Values  #: Torque on body (b) and rotor (r) per rate of body and rotor, N m s.
     u_b: Values
-    u_r: Values
-    """Speed per rate of body and rotor, m."""
-    u_0: Values = _ZERO
-    """Speed at which an imposed flow carries the robot while nothing turns, m/s."""
+    u_r: Values  #: Speed per rate of body and rotor, m.
+    u_0: Values = _ZERO  #: Speed at which an imposed flow carries the robot while nothing turns, m/s.
     t_b: Values = _ZERO
-    t_r: Values = _ZERO
-    """Torque of the imposed flow on body (b) and rotor (r) meanwhile, N m."""
+    t_r: Values = _ZERO  #: Torque of the imposed flow on body (b) and rotor (r) meanwhile, N m.
 
     def speed(self, body_rate: Values, tail_rate: Values) -> Values:
         """U, m/s."""
@@ -73,8 +69,7 @@ class FrictionTorques(NamedTuple):
     br: Values
     rb: Values
     rr: Values
-    determinant: Values
-    """bb rr - br rb, without the cancellation."""
+    determinant: Values  #: bb rr - br rb, without the cancellation.
 
     def power(self, body_rate: Values, tail_rate: Values) -> Values:
         """Power that friction takes, W."""

@@ -35,8 +35,7 @@ from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
 from spirillum.swimming.steady import STEADY, Swimming, requirements
 from spirillum.units import show
 
-PLACES_PER_FIELD = 3
-"""Gaps, and pitches at each of them."""
+PLACES_PER_FIELD = 3  #: Gaps, and pitches at each of them.
 TOLERANCE = 0.25
 """Tolerance `model.tube.tolerance` of the poses of a band: nominal, since waves to and from the tail are kept as at the
 default. At gaps of 0.3, 0.5 and 1 mm the level robot of the paper has its speed within 0.04 %, its body rate within 4 %
@@ -50,16 +49,12 @@ _SWEPT = 129  # rings of what the tail sweeps in a turn
 class Band:
     """Steady swimming of one robot at the poses that its placement leaves open, SI."""
 
-    over: tuple[str, ...]
-    """Fields of the placement that it goes over: `gap`, `pitch` or both."""
+    over: tuple[str, ...]  #: Fields of the placement that it goes over: `gap`, `pitch` or both.
     gap: PerRobot
     pitch: PerRobot
-    swimming: Swimming
-    """The quantities at each pose; NaN where it has no answer."""
-    reference: Swimming
-    """The quantities at the reference pose, which belongs to the band."""
-    left_out: tuple[Note, ...]
-    """Poses without an answer, a sentence each."""
+    swimming: Swimming  #: The quantities at each pose; NaN where it has no answer.
+    reference: Swimming  #: The quantities at the reference pose, which belongs to the band.
+    left_out: tuple[Note, ...]  #: Poses without an answer, a sentence each.
 
     def limits(self, name: str) -> tuple[float, float]:
         """Least and largest value of a quantity over all poses; NaN where it does not apply."""

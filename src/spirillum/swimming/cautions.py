@@ -19,8 +19,7 @@ from spirillum.swimming.reynolds import reynolds_limits
 from spirillum.swimming.steady import Swimming
 from spirillum.units import show
 
-NO_WEIGHT = Note.named("no-masses")
-"""Caution of a free motion of a robot whose masses are unknown."""
+NO_WEIGHT = Note.named("no-masses")  #: Caution of a free motion of a robot whose masses are unknown.
 
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
@@ -86,8 +85,7 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     return [Note.named("pose-open", open=named, more=more, fields=over)]
 
 
-CONSTANT_TORQUE = Note.named("constant-torque")
-"""What a drive of given torque takes for granted."""
+CONSTANT_TORQUE = Note.named("constant-torque")  #: What a drive of given torque takes for granted.
 
 
 def drive_warnings(

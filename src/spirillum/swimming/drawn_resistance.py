@@ -30,8 +30,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.balance import joined
 
-Draws = Mapping[str, Samples]
-"""Number to values, (draws, robots) or (draws, 1)."""
+Draws = Mapping[str, Samples]  #: Number to values, (draws, robots) or (draws, 1).
 
 _COEFFICIENTS = ("normal_factor", "tangential_factor")
 
@@ -70,10 +69,8 @@ class AxialTable:
 
     parts: tuple[Samples, ...]
     """Summands (points, robots, 3, 3): the first with factor one, the others with those of RFT's coefficients."""
-    wires: Samples
-    """Wire diameters of the points, m; a single one where the wire is not sampled."""
-    viscosity: Samples
-    """The robots' own, to which the parts belong, Pa s, (robots,) or (1,)."""
+    wires: Samples  #: Wire diameters of the points, m; a single one where the wire is not sampled.
+    viscosity: Samples  #: The robots' own, to which the parts belong, Pa s, (robots,) or (1,).
     coefficients: Mapping[str, float]
 
     @classmethod
@@ -141,13 +138,11 @@ def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tup
 class TubeResistance:
     """Resistance in the tube by the robots' tables over gap, pitch and viscosity, not sampled: the robots' own."""
 
-    tables: Samples
-    """Packed tables, a row for each robot, the shorter ones filled up."""
+    tables: Samples  #: Packed tables, a row for each robot, the shorter ones filled up.
     against: PerRobot
     """Pressure drop of the mean flow through each tube with open ends, over viscosity and velocity, times the tube's
     cross-section, m; infinite for closed ends."""
-    viscosity: PerRobot
-    """The robots' own, Pa s."""
+    viscosity: PerRobot  #: The robots' own, Pa s.
     gap: PerRobot
     pitch: PerRobot
     yaw: float = 0.0

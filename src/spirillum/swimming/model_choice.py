@@ -20,14 +20,10 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady import requirements
 
-AUTO = "auto"
-"""Name that leaves the choice of the model to `choose_model`."""
-WALLED, UNBOUNDED = "tube", "slender"
-"""What answers for a robot in a channel, and for one without."""
-IN_CHANNEL = "the robot is in a channel, whose walls this model computes"
-"""Why the model with walls is taken."""
-NO_CHANNEL = "the robot has no channel"
-"""Why the model of unbounded fluid is taken."""
+AUTO = "auto"  #: Name that leaves the choice of the model to `choose_model`.
+WALLED, UNBOUNDED = "tube", "slender"  #: What answers for a robot in a channel, and for one without.
+IN_CHANNEL = "the robot is in a channel, whose walls this model computes"  #: Why the model with walls is taken.
+NO_CHANNEL = "the robot has no channel"  #: Why the model of unbounded fluid is taken.
 
 
 def fitted_with(source: str) -> str:
@@ -40,10 +36,8 @@ class ModelChoice:
     """A hydrodynamic model, and why it was taken."""
 
     model: str
-    reason: str = ""
-    """Its reason, in half a sentence; empty where it was named."""
-    fitted: bool = False
-    """Whether it is the model of a calibration or a posterior."""
+    reason: str = ""  #: Its reason, in half a sentence; empty where it was named.
+    fitted: bool = False  #: Whether it is the model of a calibration or a posterior.
 
 
 def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None, fit: Fit = NO_FIT) -> ModelChoice:

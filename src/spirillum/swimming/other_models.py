@@ -25,12 +25,9 @@ class OtherModel:
     """Speed of a robot by another model."""
 
     model: str
-    calibrated: bool
-    """Whether the robot's calibration factors, which represent the walls, were applied."""
-    forward_velocity: float
-    """U, m/s."""
-    ratio: float
-    """U over that of the answer beside which it stands."""
+    calibrated: bool  #: Whether the robot's calibration factors, which represent the walls, were applied.
+    forward_velocity: float  #: U, m/s.
+    ratio: float  #: U over that of the answer beside which it stands.
 
 
 @dataclass(frozen=True)
@@ -39,8 +36,7 @@ class OtherModels:
 
     answers: tuple[OtherModel, ...]
     """One for each model, and one more for each that has calibration factors of this geometry."""
-    statement: str
-    """All in one line, and why they differ."""
+    statement: str  #: All in one line, and why they differ.
 
     def to_dict(self) -> dict[str, Any]:
         """As it stands in JSON."""

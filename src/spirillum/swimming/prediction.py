@@ -51,29 +51,21 @@ class Prediction(DisplayMixin):
     model: SwimmerModel
     friction: FrictionReading
     calibrated: bool
-    batch: RobotBatch = field(repr=False)
-    """The robot at its pose, as a batch of one."""
-    swimming: Swimming = field(repr=False)
-    """The quantities, as arrays of length one."""
+    batch: RobotBatch = field(repr=False)  #: The robot at its pose, as a batch of one.
+    swimming: Swimming = field(repr=False)  #: The quantities, as arrays of length one.
     error_estimate: float
     """Relative error of the forward velocity, the sum of what is known of it; NaN for a model in closed form."""
     warnings: tuple[Note, ...]
-    intervals: Intervals | None = field(default=None, repr=False)
-    """Intervals of a posterior; None without one."""
+    intervals: Intervals | None = field(default=None, repr=False)  #: Intervals of a posterior; None without one.
     band: Band | None = field(default=None, repr=False)
     """Band over the poses that the placement leaves open; None where there are none, or none was requested."""
-    motion: Motion = "held"
-    """Lateral motion and tilt constrained, or released."""
-    interval_of: str = ""
-    """Whose the intervals are, in half a sentence; empty without a posterior."""
+    motion: Motion = "held"  #: Lateral motion and tilt constrained, or released.
+    interval_of: str = ""  #: Whose the intervals are, in half a sentence; empty without a posterior.
     lying: SteadyState | None = None
     """Steady state of a free robot in its tube after its release (`placement`); None for others."""
-    choice: ModelChoice | None = None
-    """Reason of the model; None where it was named."""
-    tail_rate: float | None = None
-    """Requested lab rate of the tail, rad/s; None: the robot's drive."""
-    fitted_by: str = ""
-    """File of a calibration or a posterior whose values act on the answer; empty without one."""
+    choice: ModelChoice | None = None  #: Reason of the model; None where it was named.
+    tail_rate: float | None = None  #: Requested lab rate of the tail, rad/s; None: the robot's drive.
+    fitted_by: str = ""  #: File of a calibration or a posterior whose values act on the answer; empty without one.
     released: Mapping[str, Callable[[], ReleasedMotion]] = field(default_factory=dict, repr=False, compare=False)
     """Request for `trial` and `steady`, in seconds; empty where the held motion alone, or a free one, was requested."""
 

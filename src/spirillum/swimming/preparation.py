@@ -36,8 +36,7 @@ from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.swimming.steady import requirements
 from spirillum.units import show, show_apart
 
-_GAP_STEP = 1.02
-"""Ratio of gaps to which the least one that a model resolves is determined."""
+_GAP_STEP = 1.02  # Ratio of gaps to which the least one that a model resolves is determined.
 
 
 def prepared(
@@ -258,8 +257,7 @@ def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
 
 
 _MOST_WORKERS = 64
-_WORKERS = min(2, os.cpu_count() or 1)
-"""Processes that make a table which another request needs."""
+_WORKERS = min(2, os.cpu_count() or 1)  # Processes that make a table which another request needs.
 
 
 def check_usual_resolution(options: ModelOptions) -> None:

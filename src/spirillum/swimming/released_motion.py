@@ -21,10 +21,8 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.quantities import QUANTITIES
 
 HELD = "held"
-RELEASED = "trial"
-"""Motions of a robot in its tube, where a request takes one of both."""
-ASSUMPTION = "contact assumed, not validated"
-"""What a released motion rests on."""
+RELEASED = "trial"  #: Motions of a robot in its tube, where a request takes one of both.
+ASSUMPTION = "contact assumed, not validated"  #: What a released motion rests on.
 SPEED_OF = "speed, "
 """How a progress message begins that has the speed of a column: a terminal shows it as a line of its own."""
 
@@ -48,8 +46,7 @@ class ReleasedMotion:
     """What the motion rests on, and what became of the robot, as entries of its JSON."""
     intervals: Mapping[str, TrialInterval] = field(default_factory=dict)
     """Intervals of the quantities over the unknowns; none where they were not requested."""
-    reason: str = ""
-    """Why there is none, in a sentence; empty where there is one."""
+    reason: str = ""  #: Why there is none, in a sentence; empty where there is one.
 
     def to_dict(self) -> dict[str, Any]:
         """The object `trial` or `steady` of an answer."""
@@ -86,28 +83,18 @@ class SteadyState:
     SI; azimuths about +x from the lowest place, pitch away from the wall, yaw to +y at the lowest place.
     """
 
-    state: State
-    """`steady`, `orbits`, `goes around` or `changing`."""
-    azimuth: float
-    """Azimuth of the body's centre, mean, rad; NaN where it goes around."""
-    gap: float
-    """Smallest distance of body and wall, mean, m."""
-    gap_range: tuple[float, float]
-    """Its least and largest value."""
-    pitch: float
-    """Mean pitch against the wall, rad."""
-    yaw: float
-    """Mean yaw against the wall, rad."""
-    orbit_rate: float
-    """Rate of the azimuth, mean, rad/s."""
-    contact_force: float
-    """Load on asperities, mean, N."""
-    time: float
-    """Time over which the motion was followed since release, s."""
+    state: State  #: `steady`, `orbits`, `goes around` or `changing`.
+    azimuth: float  #: Azimuth of the body's centre, mean, rad; NaN where it goes around.
+    gap: float  #: Smallest distance of body and wall, mean, m.
+    gap_range: tuple[float, float]  #: Its least and largest value.
+    pitch: float  #: Mean pitch against the wall, rad.
+    yaw: float  #: Mean yaw against the wall, rad.
+    orbit_rate: float  #: Rate of the azimuth, mean, rad/s.
+    contact_force: float  #: Load on asperities, mean, N.
+    time: float  #: Time over which the motion was followed since release, s.
     approach_time: float
     """Time constant with which a small distance from the steady motion decays, s; NaN where there is none."""
-    ended: str = ""
-    """Why the motion was not followed to a steady one, in half a sentence; empty where it was."""
+    ended: str = ""  #: Why the motion was not followed to a steady one, in half a sentence; empty where it was.
 
     @property
     def statement(self) -> str:
@@ -143,8 +130,7 @@ class SteadyState:
         }
 
 
-Motion = Literal["held", "free"]
-"""Lateral motion and tilt constrained, or released."""
+Motion = Literal["held", "free"]  #: Lateral motion and tilt constrained, or released.
 
 LINKS = np.zeros((12, 7))
 """Twists of body and rotor from the seven rates (U, Omega_b, omega_m), all about the origin in body axes."""
@@ -155,12 +141,9 @@ LINKS[9, 6] = 1.0
 class Screw(NamedTuple):
     """The free motion, as long as both parts turn steadily; SI."""
 
-    speed: PerRobot
-    """Speed along the axis of the screw, positive where the nose leads, m/s."""
-    tilt: PerRobot
-    """Angle between the motor axis and the axis of the screw, rad."""
-    radius: PerRobot
-    """Radius of the helix on which the origin moves, m."""
+    speed: PerRobot  #: Speed along the axis of the screw, positive where the nose leads, m/s.
+    tilt: PerRobot  #: Angle between the motor axis and the axis of the screw, rad.
+    radius: PerRobot  #: Radius of the helix on which the origin moves, m.
 
     @classmethod
     def of(cls, shared: Samples, body_rate: PerRobot, tail_rate: PerRobot) -> Screw:

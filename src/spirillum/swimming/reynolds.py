@@ -18,8 +18,7 @@ from spirillum.robot.limits import Limit, all_hold, broken
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
-LOW_REYNOLDS = 0.1
-"""Reynolds number above which an answer has a warning."""
+LOW_REYNOLDS = 0.1  #: Reynolds number above which an answer has a warning.
 BEYOND_STOKES = 10.0
 """Reynolds number above which inertia dominates: an answer is refused unless `beyond_stokes` is set."""
 _BODY, _TAIL, _FLOW = "reynolds-number", "tail-reynolds-number", "flow-reynolds-number"

@@ -25,22 +25,15 @@ from spirillum.units import show
 class Scenario:
     """A robot in its pose, its model, and all else that its steady motion follows from; SI."""
 
-    robot: Robot
-    """The robot, with fitted values in place of its own."""
+    robot: Robot  #: The robot, with fitted values in place of its own.
     model: SwimmerModel
-    batch: RobotBatch
-    """The robot in its pose, as a batch of one."""
+    batch: RobotBatch  #: The robot in its pose, as a batch of one.
     friction: FrictionReading
-    tail_rate: float | None
-    """Lab rate of the tail, rad/s; None: the robot's drive."""
-    calibrated: bool
-    """Whether calibration factors are applied."""
-    motion: str
-    """Lateral motion and tilt constrained (`held`), or `free`."""
-    fit: Fit
-    """Fitted values that act on the robot."""
-    names_friction: bool
-    """Whether the robot itself, before the fit, states its effective friction."""
+    tail_rate: float | None  #: Lab rate of the tail, rad/s; None: the robot's drive.
+    calibrated: bool  #: Whether calibration factors are applied.
+    motion: str  #: Lateral motion and tilt constrained (`held`), or `free`.
+    fit: Fit  #: Fitted values that act on the robot.
+    names_friction: bool  #: Whether the robot itself, before the fit, states its effective friction.
 
     def swim(self, batch: RobotBatch, model: SwimmerModel | None = None) -> Swimming:
         """Steady swimming of the robot at some poses, by its model or by another."""

@@ -27,8 +27,7 @@ from spirillum.swimming.drives import DriveState, at_rate, battery_voltage, driv
 from spirillum.swimming.released_motion import Motion, Screw, check_full, motion_of
 from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
 
-LEVEL = 0.95
-"""Level of the intervals."""
+LEVEL = 0.95  #: Level of the intervals.
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,8 +115,7 @@ class Intervals:
 
     low: Mapping[str, float]
     high: Mapping[str, float]
-    middle: Mapping[str, float]
-    """Medians of the draws."""
+    middle: Mapping[str, float]  #: Medians of the draws.
 
     def of(self, name: str) -> dict[str, Any]:
         """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""

@@ -44,8 +44,7 @@ class Degradation(Options):
     """The glare moves with the body, instead of standing still in the lab."""
     bubbles: Annotated[int, BeforeValidator(whole(0, 200))] = 0
     """Number of bubbles that drift under the top of the tube."""
-    hand: Annotated[bool, Field(strict=True)] = False
-    """The shadow of a hand passes over the picture."""
+    hand: Annotated[bool, Field(strict=True)] = False  #: The shadow of a hand passes over the picture.
 
     @classmethod
     def of(cls, value: str | Self | Mapping[str, Any] | None) -> Self:

@@ -65,8 +65,7 @@ class Disturbances:
         self._hand_time = rng.uniform(0.2, 0.8) * duration
         self._hand_sign = rng.choice([-1.0, 1.0])
         self._hand_height = rng.uniform(0.3, 0.7)
-        self.noise = float(degradation.noise)
-        """Standard deviation of the noise, bytes."""
+        self.noise = float(degradation.noise)  #: Standard deviation of the noise, bytes.
         self._grain_rng = np.random.default_rng([seed, _GRAIN])
         self.grain = self._grain_rng.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
         """A pool of normal noise; every row of every picture starts at a random index of it."""

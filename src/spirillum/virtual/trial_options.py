@@ -55,14 +55,10 @@ class MotionOptions(Options):
 
     model: str | None = None
     """Hydrodynamic model; None: the study's first, without a study the one that `predict` answers with."""
-    friction: str | None = None
-    """Reading of the friction; None: the robot's own."""
-    tail_rate: Rate | None = None
-    """Lab rotation rate of the tail; None: the robot's drive."""
-    forward_velocity: Velocity | None = None
-    """Forward velocity instead of the model's."""
-    body_rate: Rate | None = None
-    """Lab rotation rate of the body instead of the model's."""
+    friction: str | None = None  #: Reading of the friction; None: the robot's own.
+    tail_rate: Rate | None = None  #: Lab rotation rate of the tail; None: the robot's drive.
+    forward_velocity: Velocity | None = None  #: Forward velocity instead of the model's.
+    body_rate: Rate | None = None  #: Lab rotation rate of the body instead of the model's.
 
 
 class TrialOptions(Options):
@@ -70,20 +66,15 @@ class TrialOptions(Options):
 
     argument: ClassVar[str] = "trial"
 
-    duration: Time | None = None
-    """Of the video; None: 20 s, of a run its length."""
+    duration: Time | None = None  #: Of the video; None: 20 s, of a run its length.
     start: SignedLength | None = None
     """x of the body's mid-length at the first frame, from below the lens; None: the path is centred in the picture."""
-    lateral: SignedLength = 0.0
-    """Horizontal offset across the channel (y of the lab, forward x and upward z)."""
+    lateral: SignedLength = 0.0  #: Horizontal offset across the channel (y of the lab, forward x and upward z).
     heading: Annotated[Angle, AfterValidator(_check_heading)] = 0.0
     """Angle of the robot's axis to the channel in the picture's plane, at most 45 degrees."""
-    wobble: LengthOrZero = 0.0
-    """Amplitude of a motion across the channel at the tail's rate, in the picture's plane."""
-    body_angle: Angle = 0.0
-    """Of the body at the first frame."""
-    tail_phase: Angle = 0.0
-    """Of the tail at the first frame."""
+    wobble: LengthOrZero = 0.0  #: Amplitude of a motion across the channel at the tail's rate, in the picture's plane.
+    body_angle: Angle = 0.0  #: Of the body at the first frame.
+    tail_phase: Angle = 0.0  #: Of the tail at the first frame.
     gap: LengthOrZero | None = None
     """Between body and tube, in the picture and for a model with walls; None: that of the reference pose of `tube`
     (0.5 mm for the paper's body). A run has its own."""
@@ -98,12 +89,10 @@ class CameraOptions(Options):
     """From the `top`, or level from the `side` of the tank."""
     direction: Annotated[Literal["right", "left"], BeforeValidator(one_of("right", "left"))] = "right"
     """Where the nose points in the picture, `right` or `left`."""
-    fps: Annotated[float, BeforeValidator(_read_frame_rate)] = 30.0
-    """Frames per second."""
+    fps: Annotated[float, BeforeValidator(_read_frame_rate)] = 30.0  #: Frames per second.
     size: Annotated[tuple[int, int], BeforeValidator(_read_size)] = (640, 480)
     """Width and height in pixels, even numbers, or ``"640x480"``."""
-    exposure: Time = 1.0 / 120.0
-    """Of each frame; 1/120 s by default."""
+    exposure: Time = 1.0 / 120.0  #: Of each frame; 1/120 s by default.
     field_of_view: Annotated[SignedLength, AfterValidator(_check_field)] | None = None
     """Width of the picture at the reference plane, 1 mm to 1 m; None: 166.8 mm, about nine of the paper's bodies. In a
     smaller field, as a microscope's, the ruler and the structure of the floor are finer."""
@@ -133,14 +122,11 @@ class SetupErrors(Options):
 
     argument: ClassVar[str] = "setup_errors"
 
-    depth_error: SignedLength = 0.0
-    """Planted error of the setup's height of the robot's axis."""
-    depth_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that height in the setup."""
+    depth_error: SignedLength = 0.0  #: Planted error of the setup's height of the robot's axis.
+    depth_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that height in the setup.
 
 
 class Seeded(Options):
     """Options with a random seed."""
 
-    seed: Annotated[int, BeforeValidator(whole(0, 2**31 - 1))] = 0
-    """Of all random numbers."""
+    seed: Annotated[int, BeforeValidator(whole(0, 2**31 - 1))] = 0  #: Of all random numbers.

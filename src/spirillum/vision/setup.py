@@ -22,25 +22,18 @@ _Corners = Annotated[int, Field(strict=True, ge=3, le=50)]
 class Checkerboard(Section):
     """Pictures of a checkerboard in air, from which the lens's distortion and focal length are found."""
 
-    images: Annotated[Text, Field(min_length=1, max_length=1000)]
-    """Folder of the pictures, beside the setup file."""
-    columns: _Corners
-    """Inner corners along a row."""
-    rows: _Corners
-    """Inner corners along a column."""
-    square: Length
-    """Side of a square."""
+    images: Annotated[Text, Field(min_length=1, max_length=1000)]  #: Folder of the pictures, beside the setup file.
+    columns: _Corners  #: Inner corners along a row.
+    rows: _Corners  #: Inner corners along a column.
+    square: Length  #: Side of a square.
 
 
 class CameraSetup(Section):
     """The camera. It looks straight down (`top`), or level at the channel (`side`)."""
 
-    view: Literal["top", "side"] = "top"
-    """`top`: from above; `side`: level, upright, at right angles to the channel."""
-    height: Length
-    """Height of the lens above the reference plane: the tank's floor; for `side` its far wall."""
-    height_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that height."""
+    view: Literal["top", "side"] = "top"  #: `top`: from above; `side`: level, upright, at right angles to the channel.
+    height: Length  #: Height of the lens above the reference plane: the tank's floor; for `side` its far wall.
+    height_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that height.
     frames_per_second: Annotated[float, Field(strict=True, ge=0.01, le=1e5, allow_inf_nan=False)] | None = None
     """Frames a second of a folder of images, or instead of a video's own time stamps."""
     pixel_aspect_ratio: Annotated[float, Field(strict=True, ge=0.2, le=5.0, allow_inf_nan=False)] | None = None
@@ -57,8 +50,7 @@ class TankSetup(Section):
 
     surface: Length | None = None
     """Height of the flat surface between air and oil (`side`: of the tank's near wall); unset: nothing refracts."""
-    surface_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that height."""
+    surface_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that height.
     index: Annotated[float, Field(strict=True, ge=INDICES[0], le=INDICES[1], allow_inf_nan=False)] = 1.4
     """Refractive index of the oil."""
     index_uncertainty: Annotated[float, Field(strict=True, ge=0.0, le=0.5, allow_inf_nan=False)] = 0.0
@@ -68,18 +60,13 @@ class TankSetup(Section):
 class Markers(Section):
     """What gives the scale: a ruler of equally spaced lines across the direction of swimming, or a known scale."""
 
-    spacing: Length | None = None
-    """Distance from each line of the ruler to the next (the paper: 2 mm)."""
-    spacing_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that distance."""
-    height: LengthOrZero | None = None
-    """Height of the ruler above the reference plane."""
-    height_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that height."""
+    spacing: Length | None = None  #: Distance from each line of the ruler to the next (the paper: 2 mm).
+    spacing_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that distance.
+    height: LengthOrZero | None = None  #: Height of the ruler above the reference plane.
+    height_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that height.
     length_per_pixel: Length | None = None
     """Instead of a ruler: length that one pixel shows at the height of the robot's axis."""
-    length_per_pixel_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that length."""
+    length_per_pixel_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that length.
 
     @model_validator(mode="after")
     def _one_scale(self) -> Self:
@@ -96,14 +83,11 @@ class Markers(Section):
 class RobotSetup(Section):
     """The robot in front of the camera."""
 
-    file: Annotated[Text, Field(min_length=1, max_length=1000)]
-    """A preset, or a robot file beside the setup file."""
-    axis_height: Length
-    """Height of the robot's axis above the reference plane."""
+    file: Annotated[Text, Field(min_length=1, max_length=1000)]  #: A preset, or a robot file beside the setup file.
+    axis_height: Length  #: Height of the robot's axis above the reference plane.
     axis_height_uncertainty: LengthOrZero = 0.0
     """Standard uncertainty of that height: 10 mm of depth can be 7 % of scale."""
-    direction: Literal["right", "left", "up", "down"] = "right"
-    """Where in the picture the nose points."""
+    direction: Literal["right", "left", "up", "down"] = "right"  #: Where in the picture the nose points.
     appearance: Literal["opaque", "glass", "unknown"] = "unknown"
     """What the body's cover looks like: `opaque`, or `glass`, through which its contents and the background show."""
     stripes: Stripes | None = None
@@ -113,33 +97,22 @@ class RobotSetup(Section):
 class Region(Section):
     """The part of the picture to look at, pixels from its upper left corner."""
 
-    left: _Pixels = 0
-    """First column."""
-    top: _Pixels = 0
-    """First row."""
-    width: Annotated[int, Field(strict=True, ge=32, le=100_000)]
-    """Number of columns."""
-    height: Annotated[int, Field(strict=True, ge=32, le=100_000)]
-    """Number of rows."""
+    left: _Pixels = 0  #: First column.
+    top: _Pixels = 0  #: First row.
+    width: Annotated[int, Field(strict=True, ge=32, le=100_000)]  #: Number of columns.
+    height: Annotated[int, Field(strict=True, ge=32, le=100_000)]  #: Number of rows.
 
 
 class Setup(Section):
     """A setup: where camera, oil surface, ruler and robot are, and what each of them is."""
 
-    camera: CameraSetup
-    """The camera."""
-    tank: TankSetup = TankSetup()
-    """What the camera looks through."""
-    markers: Markers
-    """What gives the scale."""
-    robot: RobotSetup
-    """The robot."""
-    region: Region | None = None
-    """Part of the picture to look at; unset: all of it."""
-    start: Time = 0.0
-    """Time in the video from which on to measure, as when the robot has started up."""
-    end: Time | None = None
-    """Time in the video until which to measure; unset: its end."""
+    camera: CameraSetup  #: The camera.
+    tank: TankSetup = TankSetup()  #: What the camera looks through.
+    markers: Markers  #: What gives the scale.
+    robot: RobotSetup  #: The robot.
+    region: Region | None = None  #: Part of the picture to look at; unset: all of it.
+    start: Time = 0.0  #: Time in the video from which on to measure, as when the robot has started up.
+    end: Time | None = None  #: Time in the video until which to measure; unset: its end.
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

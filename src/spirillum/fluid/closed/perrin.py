@@ -21,14 +21,10 @@ from spirillum.robot.limits import Limit
 class SpheroidDrag(NamedTuple):
     """Diagonal of a spheroid's resistance matrix about its centre."""
 
-    axial: PerRobot
-    """D_x, force per velocity along the axis, N s/m."""
-    transverse: PerRobot
-    """D_y = D_z, N s/m."""
-    axial_rotation: PerRobot
-    """E_x, torque per rate about the axis, N m s."""
-    transverse_rotation: PerRobot
-    """E_y = E_z, N m s."""
+    axial: PerRobot  #: D_x, force per velocity along the axis, N s/m.
+    transverse: PerRobot  #: D_y = D_z, N s/m.
+    axial_rotation: PerRobot  #: E_x, torque per rate about the axis, N m s.
+    transverse_rotation: PerRobot  #: E_y = E_z, N m s.
 
 
 def spheroid_drag(viscosity: PerRobot, a: PerRobot, b: PerRobot) -> SpheroidDrag:

@@ -34,12 +34,9 @@ from spirillum.robot.model_options import ModelOptions
 class LocalCoefficients(NamedTuple):
     """Local resistance coefficients, N s/m^2."""
 
-    tangential: PerRobot
-    """c_t, along the wire."""
-    normal: PerRobot
-    """c_n = c_b, across the wire (near a floor: parallel to it)."""
-    floor_normal: PerRobot | None = None
-    """Across the wire and normal to the floor, where there is one."""
+    tangential: PerRobot  #: c_t, along the wire.
+    normal: PerRobot  #: c_n = c_b, across the wire (near a floor: parallel to it).
+    floor_normal: PerRobot | None = None  #: Across the wire and normal to the floor, where there is one.
 
 
 def printed(batch: RobotBatch) -> LocalCoefficients:
@@ -130,8 +127,7 @@ def _domain_of_the_set(batch: RobotBatch) -> list[Limit]:
 
 _PANELS_PER_TURN = 7
 _NODES_PER_PANEL = 16  # 112 nodes per wavelength; the paper uses at least 100 intervals
-_FLOOR_PHASES = 32
-"""Phases over which entries near a floor are averaged for a wire without a closed form."""
+_FLOOR_PHASES = 32  # Phases over which entries near a floor are averaged for a wire without a closed form.
 _ROOT_BREAKS = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 13.0, 18.0, 26.0, 38.0])
 
 

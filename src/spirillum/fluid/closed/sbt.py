@@ -86,8 +86,7 @@ def _stretched(alpha: Samples) -> Samples:
     return np.log(alpha / (1.0 + alpha / 2.0))
 
 
-PRINTED_EPS_CONSTANT = 2.6
-"""Constant of eps as the paper prints it."""
+PRINTED_EPS_CONSTANT = 2.6  #: Constant of eps as the paper prints it.
 EXACT_EPS_CONSTANT = 0.5 * np.pi * np.exp(0.5)
 """pi sqrt(e)/2 = 2.58981: Lighthill's cut-off delta = a sqrt(e)/2 (SIAM Rev. 18:161, 1976)."""
 
@@ -112,14 +111,10 @@ class HelixFunctions(NamedTuple):
     """Lighthill's dimensionless functions of a helix."""
 
     alpha: PerRobot
-    q: PerRobot
-    """-1 - log(eps) + A1, the bracket of (1) and (7)."""
-    torque: PerRobot
-    """1/chi, the inverse of eq. (3)."""
-    Psi: PerRobot
-    """Velocity reduction of a towed helix, eq. (6)."""
-    psi: PerRobot
-    """Velocity reduction of a swimming helix, eq. (7)."""
+    q: PerRobot  #: -1 - log(eps) + A1, the bracket of (1) and (7).
+    torque: PerRobot  #: 1/chi, the inverse of eq. (3).
+    Psi: PerRobot  #: Velocity reduction of a towed helix, eq. (6).
+    psi: PerRobot  #: Velocity reduction of a swimming helix, eq. (7).
 
 
 def _eps_constant(batch: RobotBatch) -> float:

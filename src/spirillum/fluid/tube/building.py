@@ -59,10 +59,8 @@ _HALF_TURN = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
 class OnAxis:
     """Resistance of a robot at offset 0 for any pitch and yaw."""
 
-    pitches: Samples
-    """Pitches of both signs, increasing, rad."""
-    values: Samples
-    """Fourier coefficients of the factor there, (pitches, phases, 36)."""
+    pitches: Samples  #: Pitches of both signs, increasing, rad.
+    values: Samples  #: Fourier coefficients of the factor there, (pitches, phases, 36).
 
     @classmethod
     def of(cls, pitches: Samples, values: Samples) -> OnAxis:
@@ -103,8 +101,7 @@ def _about_x(angle: float) -> Samples:
 
 
 _SEED = 20121
-_CHECKED_PHASES = 3
-"""Phases of the tail at a check pose: its solids are solved for once."""
+_CHECKED_PHASES = 3  # Phases of the tail at a check pose: its solids are solved for once.
 _NO_YAW = kernel.yaw_limit_of(np.zeros(1), np.zeros(1), np.zeros(1), 0.0)
 """Limit of the yaw of a table without yawed nodes."""
 
@@ -254,8 +251,7 @@ class _Place(NamedTuple):
     t: float
     f: float
     pose: TubePose
-    phases: int
-    """Of the tail, evenly spread."""
+    phases: int  #: Of the tail, evenly spread.
 
 
 def _phases_at(places: Places, pose: TubePose) -> int:

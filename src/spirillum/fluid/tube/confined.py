@@ -30,29 +30,22 @@ _EIGHT_PI = 8.0 * np.pi
 class Strengths:
     """Source strengths on solids and wires for each of the 12 unit twists and the imposed flow; viscosity 1."""
 
-    solids: Solids
-    """Solids, with the unknowns of `tractions`."""
-    tractions: tuple[Samples, Samples]
-    """Modes of the tractions, even and odd, (unknowns, 13)."""
+    solids: Solids  #: Solids, with the unknowns of `tractions`.
+    tractions: tuple[Samples, Samples]  #: Modes of the tractions, even and odd, (unknowns, 13).
     wires: tuple[Wire, ...]
-    forces: Samples
-    """At the wires' stations, in the axes used here, (3 stations, 13)."""
+    forces: Samples  #: At the wires' stations, in the axes used here, (3 stations, 13).
 
 
 @dataclass(frozen=True)
 class Held:
     """Wrenches on the robot for each of the 12 unit twists, and in the flow of unit mean velocity; viscosity 1."""
 
-    matrix: Samples
-    """R for zero net flux, 12x12, made symmetric; zero for a part that is not there."""
-    load: Samples
-    """Wrenches on the robot at rest in the flow of unit mean velocity, (12,)."""
-    drag: float
-    """Work of the tractions at rest in that flow against it, over the mean velocity squared."""
+    matrix: Samples  #: R for zero net flux, 12x12, made symmetric; zero for a part that is not there.
+    load: Samples  #: Wrenches on the robot at rest in the flow of unit mean velocity, (12,).
+    drag: float  #: Work of the tractions at rest in that flow against it, over the mean velocity squared.
     asymmetry: float
     """Deviation of the matrix from symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
-    strengths: Strengths = field(repr=False)
-    """Underlying source strengths."""
+    strengths: Strengths = field(repr=False)  #: Underlying source strengths.
 
 
 def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> Held:
@@ -117,14 +110,11 @@ class _Link:
     solids: Solids
     wires: tuple[Wire, ...]
     system: WireSystem
-    mobility: Samples
-    """Of the wires with the wall, the solids not there."""
-    motion: Samples
-    """Velocities at the stations (and gradients along moments), (3 n + q n, 13)."""
+    mobility: Samples  #: Of the wires with the wall, the solids not there.
+    motion: Samples  #: Velocities at the stations (and gradients along moments), (3 n + q n, 13).
     sent: list[Samples]
     """Fields on the solids from unit forces and moments at the stations, for each system, (fields, 3 n + q n)."""
-    answers: tuple[Answers, ...]
-    """Response of the solids to those fields; empty without solids."""
+    answers: tuple[Answers, ...]  #: Response of the solids to those fields; empty without solids.
 
     @classmethod
     def of(cls, solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float) -> _Link:

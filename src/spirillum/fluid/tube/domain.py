@@ -16,14 +16,10 @@ from spirillum.robot.limits import Limit, within
 from spirillum.robot.tube_pose import TubePose, gap_of, largest_gap
 from spirillum.units import show
 
-WIRE_FILM = 0.75
-"""Smallest resolved clearance between the wire's surface and the wall, over the wire's radius."""
-_THINNEST_GAP = 1e-3
-"""Smallest resolved clearance between a solid and the wall, over the body's diameter."""
-_TIGHTEST = 1.05
-"""Diameter of the tightest tube over the body's."""
-_WIDEST = 1e3
-"""Largest size of a channel, m: those without one are infinite."""
+WIRE_FILM = 0.75  #: Smallest resolved clearance between the wire's surface and the wall, over the wire's radius.
+_THINNEST_GAP = 1e-3  # Smallest resolved clearance between a solid and the wall, over the body's diameter.
+_TIGHTEST = 1.05  # Diameter of the tightest tube over the body's.
+_WIDEST = 1e3  # Largest size of a channel, m: those without one are infinite.
 
 
 def pose_of(batch: RobotBatch, index: int = 0) -> TubePose:
@@ -70,14 +66,11 @@ def placement_answer(batch: RobotBatch) -> dict[str, Any]:
 class _Films(NamedTuple):
     """Distances between the parts of robots and the wall, m; infinite for parts that do not matter."""
 
-    asked: PerRobot
-    """Requested gap."""
-    largest: PerRobot
-    """Largest gap that there is room for."""
+    asked: PerRobot  #: Requested gap.
+    largest: PerRobot  #: Largest gap that there is room for.
     coupling: PerRobot
     tail: PerRobot
-    where: str
-    """Position of the smallest clearance of the last tail."""
+    where: str  #: Position of the smallest clearance of the last tail.
 
 
 def pose_limits(

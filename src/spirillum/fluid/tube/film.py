@@ -40,8 +40,7 @@ from spirillum.kernels import tube_table as table
 from spirillum.robot.outline import Outline
 from spirillum.units import show
 
-_EXTRA = 3
-"""Gauss points of an element beyond its polynomials' degree."""
+_EXTRA = 3  # Gauss points of an element beyond its polynomials' degree.
 _ROUNDING = 1e-13
 """What is added to the stiffness's diagonal, over it: where mobilities differ by 1e15 in one element, rounding leaves
 it without a Cholesky factor."""
@@ -49,16 +48,11 @@ _SHEARED = 0.2
 """Thickness over the body's radius above which the shear of the gap is left out: it is no lubrication film."""
 _THINNEST, _INTERVALS, _YAWS = 2e-5, 15, 5
 """Thinnest clearance of a table over the body's radius, intervals of its splines, polynomials in yaw."""
-_LEAST_YAW = 0.03
-"""Coordinate of the smallest yaw at the nodes of a table."""
-_STEEPEST = 0.5
-"""Largest sine of pitch at the nodes of a table."""
-_LESS = 0.97
-"""Ratio of one inclination to the one before where the body touches."""
-_SHORTEST = 0.3
-"""Shortest straight side over the body's radius for which a table's coordinates serve."""
-_SPHEROID_PITCH = 0.6
-"""Largest pitch of a spheroid's table, rad."""
+_LEAST_YAW = 0.03  # Coordinate of the smallest yaw at the nodes of a table.
+_STEEPEST = 0.5  # Largest sine of pitch at the nodes of a table.
+_LESS = 0.97  # Ratio of one inclination to the one before where the body touches.
+_SHORTEST = 0.3  # Shortest straight side over the body's radius for which a table's coordinates serve.
+_SPHEROID_PITCH = 0.6  # Largest pitch of a spheroid's table, rad.
 
 
 class _Basis(NamedTuple):
@@ -66,8 +60,7 @@ class _Basis(NamedTuple):
 
     nodes: Samples
     weights: Samples
-    values: Samples
-    """(points, functions)."""
+    values: Samples  #: (points, functions).
     slopes: Samples
     pairs: Samples
     """Products of slopes with slopes, values with values, slopes with values, values with slopes:

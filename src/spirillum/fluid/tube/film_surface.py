@@ -16,12 +16,9 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robot.outline import Arc, Outline, Piece, Segment, Smooth
 
-ROUNDED = 0.7
-"""Angle of a rounded end that belongs to the lubrication film, rad."""
-PATCH = 1.2
-"""Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
-_LEAST = 1e-12
-"""Smallest film thickness over the tube's radius."""
+ROUNDED = 0.7  #: Angle of a rounded end that belongs to the lubrication film, rad.
+PATCH = 1.2  #: Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from.
+_LEAST = 1e-12  # Smallest film thickness over the tube's radius.
 _FADE = 0.3
 """Depth of the body's axis below the tube's, over the room, at which no side is nearer to the wall any more."""
 _TURNED = (0.62, 0.14)
@@ -31,20 +28,13 @@ TOUCHES = "the body touches the wall of the tube"
 _NO_FILM = "the lubrication film of body.profile is not known:"
 _TILTED = float(np.radians(12.0))
 """Angle of its normal up to which an outline can near the wall: the largest pitch of a table, rad."""
-_LEVEL = 2e-5
-"""How far a straight side may be off the largest radius, over it."""
-_SIDE = 0.3
-"""Shortest straight side, over the radius."""
-_EDGE = 1e-2
-"""Radius of an end, over that of the body, below which it is an edge."""
-_LEAST_HALF = 0.3
-"""Least half-length over the radius of a spheroid that stands for a body."""
-_INSIDE = 0.9
-"""Share of such a body, from its widest place to its nearer end, that belongs to the lubrication film."""
-_OFF = 5e-4
-"""How far an outline may be off the circles or the spheroid that stand for it, over its radius."""
-_SLENDER = 0.3
-"""Least angle of the film on a rounded end whose radius is larger than the body's, rad."""
+_LEVEL = 2e-5  # How far a straight side may be off the largest radius, over it.
+_SIDE = 0.3  # Shortest straight side, over the radius.
+_EDGE = 1e-2  # Radius of an end, over that of the body, below which it is an edge.
+_LEAST_HALF = 0.3  # Least half-length over the radius of a spheroid that stands for a body.
+_INSIDE = 0.9  # Share of such a body, from its widest place to its nearer end, that belongs to the lubrication film.
+_OFF = 5e-4  # How far an outline may be off the circles or the spheroid that stand for it, over its radius.
+_SLENDER = 0.3  # Least angle of the film on a rounded end whose radius is larger than the body's, rad.
 _HALF = 0.5 * np.pi
 _AXIS = np.array([1.0, 0.0, 0.0])
 
@@ -54,15 +44,13 @@ class FilmBody:
     """Geometry of a body of revolution for its lubrication film, about its mid-length; lengths in m."""
 
     radius: float
-    half: float
-    """Half-length of a spheroid along its axis; 0 for a body with a straight side."""
+    half: float  #: Half-length of a spheroid along its axis; 0 for a body with a straight side.
     rear: tuple[float, float]
     """Where the straight side ends behind, x, and the radius f of the rounded end there: 0 flat, a hemisphere, and more
     a slender end. Of a spheroid the x of its middle, and 0."""
     front: tuple[float, float]
     """Where the straight side ends in front, x, and the radius f of the rounded end there; of a spheroid as `rear`."""
-    patch: float = PATCH
-    """Half-width of a spheroid's film along it, rad of the unit sphere that it is stretched from."""
+    patch: float = PATCH  #: Half-width of a spheroid's film along it, rad of the unit sphere that it is stretched from.
 
     @property
     def rings(self) -> list[tuple[float, float, float, float]]:
@@ -182,17 +170,13 @@ class FilmSurface(NamedTuple):
 class Cuts(NamedTuple):
     """Points on [-1, 1] at which the surface is evaluated, and the number of equal elements that they fill."""
 
-    side: Samples
-    """Along the straight side."""
+    side: Samples  #: Along the straight side.
     sides: int
-    rounded: Samples
-    """Along a rounded end, and along half of a spheroid."""
+    rounded: Samples  #: Along a rounded end, and along half of a spheroid.
     rounds: int
-    patch: Samples
-    """Along a spheroid."""
+    patch: Samples  #: Along a spheroid.
     patches: int
-    around: Samples
-    """Around the body."""
+    around: Samples  #: Around the body.
 
 
 class _Stretched(NamedTuple):
@@ -232,11 +216,9 @@ class Place:
     """Pose of a body in a tube."""
 
     body: FilmBody
-    tube: float
-    """R, m."""
+    tube: float  #: R, m.
     offset: float
-    axes: Samples
-    """Axes of F as columns."""
+    axes: Samples  #: Axes of F as columns.
 
     def clearance(self, points: Samples) -> Samples:
         """H of points in F, m."""

@@ -124,10 +124,8 @@ def _put(table: TubeTable) -> TubeTable:
     return table
 
 
-THINNEST_GAP = 1e-5
-"""Smallest gap over the body's diameter of the tabulated lubrication films."""
-_HELD = [0, 1, 3, 4]
-"""Indices of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
+THINNEST_GAP = 1e-5  #: Smallest gap over the body's diameter of the tabulated lubrication films.
+_HELD = [0, 1, 3, 4]  # Indices of U, Omega, omega and the mean flow in the axial form of both parts and the flow.
 
 
 def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:

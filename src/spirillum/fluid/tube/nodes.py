@@ -27,22 +27,17 @@ from spirillum.robot.outline import Arc, Outline, Segment, Smooth
 from spirillum.robot.tube_pose import TubePose, last_clear
 from spirillum.units import show
 
-_THINNEST_REST = 0.08
-"""Gap of the first nodes over the body's radius: the outer resistance is smooth below it."""
-CHECKED_FROM = 0.4
-"""Least gap of a table's check poses over that of the first nodes."""
-_SWEPT = 121
-"""Points along the tail at which its clearance from the wall is computed."""
-_TAIL_FILM = 1.2
-"""Clearance of the tail at the first nodes over the least that the model resolves."""
+_THINNEST_REST = 0.08  # Gap of the first nodes over the body's radius: the outer resistance is smooth below it.
+CHECKED_FROM = 0.4  #: Least gap of a table's check poses over that of the first nodes.
+_SWEPT = 121  # Points along the tail at which its clearance from the wall is computed.
+_TAIL_FILM = 1.2  # Clearance of the tail at the first nodes over the least that the model resolves.
 LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most nodes the wall limits the tail to a smaller one."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
 _LEAST_PITCH = np.radians(0.2)
 _SEARCH_YAW = (float(np.radians(44.0)), 45, 1e-6)
 """Largest yaw that is tried, steps, and accuracy of the search for the tail's contact, rad."""
-_SEARCH = (31, 1e-6)
-"""Steps of the search for contact, and its accuracy, rad."""
+_SEARCH = (31, 1e-6)  # Steps of the search for contact, and its accuracy, rad.
 
 
 def rings_of(outline: Outline) -> Samples:

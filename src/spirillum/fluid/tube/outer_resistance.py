@@ -24,12 +24,9 @@ from spirillum.robot.tube_pose import TubePose
 from spirillum.units import show
 from spirillum.worker_pool import imap_unordered
 
-HARMONICS = 4
-"""Harmonics of the tail's phase that a table stores."""
-PHASES = 2 * HARMONICS + 1
-"""Phases of the tail that give them all."""
-_PHASES_OF_STARTS = 5
-"""Phases of a tail with several starts: two harmonics of its period."""
+HARMONICS = 4  #: Harmonics of the tail's phase that a table stores.
+PHASES = 2 * HARMONICS + 1  #: Phases of the tail that give them all.
+_PHASES_OF_STARTS = 5  # Phases of a tail with several starts: two harmonics of its period.
 
 _RATES = np.zeros((MOTIONS, RATES))  # The 12 twists and the flow from the 8 rates (U, Omega, omega_m, mean flow).
 _RATES[:6, :6] = _RATES[6:12, :6] = np.eye(6)

@@ -38,20 +38,13 @@ _SKETCH, _WALL_SKETCH = 96, 128
 class Answers:
     """Solids' response for one system of unknowns: the basis, fields in unbounded fluid first, and responses to it."""
 
-    tractions: Samples
-    """Responses to unit fields, (unknowns, fields)."""
-    work: Samples
-    """Of those tractions against the fields, (fields, fields)."""
-    drag: Samples
-    """Work of the moving solids' tractions against the fields, (fields, motions)."""
-    push: Samples
-    """Work of the responses in the solids' motions, (motions, fields)."""
-    free: tuple[tuple[int, int, Samples], ...]
-    """Parity, mode, and coefficients from ring sources, (fields, sources)."""
-    wall: tuple[Samples, ...]
-    """Coefficients from waves at points, for each k, (orders, parities, 2, 3, fields)."""
-    parities: tuple[int, ...]
-    """Of those waves."""
+    tractions: Samples  #: Responses to unit fields, (unknowns, fields).
+    work: Samples  #: Of those tractions against the fields, (fields, fields).
+    drag: Samples  #: Work of the moving solids' tractions against the fields, (fields, motions).
+    push: Samples  #: Work of the responses in the solids' motions, (motions, fields).
+    free: tuple[tuple[int, int, Samples], ...]  #: Parity, mode, and coefficients from ring sources, (fields, sources).
+    wall: tuple[Samples, ...]  #: Coefficients from waves at points, for each k, (orders, parities, 2, 3, fields).
+    parities: tuple[int, ...]  #: Of those waves.
 
     def only(self, low: int, high: int, stations: int) -> Answers:
         """From the ring sources at stations `low` to `high` of `stations`."""
@@ -68,8 +61,7 @@ class Reduced:
 
     sources: Sources
     waves: WallWaves
-    away: float
-    """Smallest distance of the solids from the wall, m."""
+    away: float  #: Smallest distance of the solids from the wall, m.
     answers: tuple[Answers, ...]
 
     @classmethod

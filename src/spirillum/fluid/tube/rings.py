@@ -21,12 +21,9 @@ from spirillum.fluid.wire.sources import Panels
 class Rows(NamedTuple):
     """Unknowns of one parity: for each mode the rows, of 3 a node, that bear it."""
 
-    parity: int
-    """0 even, 1 odd."""
-    of_mode: tuple[np.ndarray, ...]
-    """For each mode."""
-    dual: Samples
-    """Quadrature weights of the unknowns over the surface, (unknowns,)."""
+    parity: int  #: 0 even, 1 odd.
+    of_mode: tuple[np.ndarray, ...]  #: For each mode.
+    dual: Samples  #: Quadrature weights of the unknowns over the surface, (unknowns,).
 
     @property
     def starts(self) -> np.ndarray:
@@ -108,8 +105,7 @@ def finer(panels: Panels, distances: Samples, cut: float, least: int) -> tuple[S
     return x, rho, average
 
 
-_FINER = 4
-"""Nodes that average waves over a panel, over its own, at least."""
+_FINER = 4  # Nodes that average waves over a panel, over its own, at least.
 
 
 class LevelRings(Rings):

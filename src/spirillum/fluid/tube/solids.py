@@ -27,8 +27,7 @@ from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline, Segment
 from spirillum.robot.tube_pose import TubePose
 
-MOTIONS = 13
-"""Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, opposed."""
+MOTIONS = 13  #: Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, opposed.
 
 
 @dataclass(frozen=True)
@@ -36,15 +35,12 @@ class Fineness:
     """Resolution of the flow in a tube."""
 
     wire: Accuracy = "standard"
-    tolerance: float = 1e-4
-    """At which Fourier modes are cut off."""
+    tolerance: float = 1e-4  #: At which Fourier modes are cut off.
     order: int = 8
-    panel: float = 2.5
-    """Longest panels over the length on which the film's traction varies."""
+    panel: float = 2.5  #: Longest panels over the length on which the film's traction varies.
     growth: float = 0.0
     """How much longer panels of a level solid's straight side may be, over their distance from its ends."""
-    wires: float = 1e-3
-    """Coarsest tolerance of waves to and from wires."""
+    wires: float = 1e-3  #: Coarsest tolerance of waves to and from wires.
     slack: float = SLACK
     crowd: float = CROWD
 
@@ -72,8 +68,7 @@ def _damping(tolerance: float) -> float:
     return float(min(10.0 * tolerance, 0.2 * np.sqrt(tolerance)))
 
 
-_SINGLE = 5e-3
-"""Finest tolerance at which single precision will do."""
+_SINGLE = 5e-3  # Finest tolerance at which single precision will do.
 
 
 class Solids:

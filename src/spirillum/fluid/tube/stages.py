@@ -22,8 +22,7 @@ Tilt = Literal["level", "pitched", "yawed"]
 Where = Literal["near", "far", "tight"]
 """Near the glass, far from it, or in a tube of less than twice the body's diameter."""
 
-_NEAR = 0.12
-"""Gap over the body's radius below which a node is near the glass."""
+_NEAR = 0.12  # Gap over the body's radius below which a node is near the glass.
 _TIGHT = 0.5
 """Radius of the body over the tube's from which on the fluid that it displaces along the tube multiplies errors."""
 
@@ -33,35 +32,26 @@ class Stage:
     """Nodes and resolution of a table; see `spirillum.fluid.tube.nodes` for the coordinates t and f."""
 
     name: StageName
-    up: tuple[float, ...]
-    """Nodes f nose up."""
-    down: tuple[float, ...]
-    """Nodes f nose down."""
-    upper: tuple[float, ...]
-    """Nodes t far from the floor."""
+    up: tuple[float, ...]  #: Nodes f nose up.
+    down: tuple[float, ...]  #: Nodes f nose down.
+    upper: tuple[float, ...]  #: Nodes t far from the floor.
     phases: tuple[tuple[float, int], ...]
     """Phases of the tail from which clearance on, over the radius that it sweeps; near the glass it has more harmonics
     over a turn."""
-    resolutions: dict[tuple[Where, Tilt], Fineness]
-    """Resolution of the flow at nodes."""
+    resolutions: dict[tuple[Where, Tilt], Fineness]  #: Resolution of the flow at nodes.
     seconds: tuple[float, float]
-    held_out: int
-    """Poses without yaw, and with it, from which the table's errors are stated."""
-    checks: dict[tuple[Where, Tilt], Fineness]
-    """Resolution of the flow at these poses."""
+    held_out: int  #: Poses without yaw, and with it, from which the table's errors are stated.
+    checks: dict[tuple[Where, Tilt], Fineness]  #: Resolution of the flow at these poses.
     hardest: tuple[tuple[float, float], ...] = ()
     """The first of these poses without yaw, where interpolation errs most: log t from half the first node (0) to the
     axis (1), and f."""
     hardest_yawed: tuple[tuple[float, float, float], ...] = ()
     """The first of those with yaw: as `hardest`, and the yaw over the largest one there."""
-    growth: float = 2.0
-    """About the ratio of one node t to the one before, near the floor."""
-    accuracy: float = 2.0
-    """Largest relative error that it should have, over that of the finest stage."""
+    growth: float = 2.0  #: About the ratio of one node t to the one before, near the floor.
+    accuracy: float = 2.0  #: Largest relative error that it should have, over that of the finest stage.
     yawed: bool = True
     film_yaws: int = 5
-    film_intervals: int = 15
-    """Intervals of its splines: with 11 it is within 0.4 %."""
+    film_intervals: int = 15  #: Intervals of its splines: with 11 it is within 0.4 %.
 
     def fineness(self, level_gap: float, body_radius: float, pose: TubePose, *, check: bool = False) -> Fineness:
         """Return the resolution of a node, or of a check pose, whose level gap is given."""
@@ -81,8 +71,7 @@ _FINEST: dict[tuple[Where, Tilt], Fineness] = {
     for tilt in get_args(Tilt)
 }
 """With 8 Gauss nodes a panel no response changes by more than 0.1 %."""
-_FINE_FAR = Fineness("standard", 0.03, 4)
-"""Far from the glass no response changes by more than 0.2 % to the finest."""
+_FINE_FAR = Fineness("standard", 0.03, 4)  # Far from the glass no response changes by more than 0.2 % to the finest.
 _LOOSE = Fineness("standard", 0.03, 4, wires=4e-3, slack=2.0, crowd=1.25)
 _FAR = replace(_LOOSE, wires=1e-3)
 _FINER = replace(_LOOSE, tolerance=0.01, order=6, panel=3.5, slack=1.0)

@@ -35,8 +35,7 @@ from spirillum.kernels import core, tube_table
 from spirillum.robot.tail_form import PLAIN
 
 _REST = 3e-6
-_FILM = np.where(np.arange(core.FILM_ENTRIES) < len(tube_table.ORDER), 2e-5, 1e-6)
-"""Quantum of the stored numbers."""
+_FILM = np.where(np.arange(core.FILM_ENTRIES) < len(tube_table.ORDER), 2e-5, 1e-6)  # Quantum of the stored numbers.
 _MOST_STEPS = 2.0**31 - 1.0
 """Bound of film coefficients: larger ones belong to angles at which no robot fits into its tube."""
 _FILTER = {"id": lzma.FILTER_LZMA2, "preset": 6, "pb": 0, "lc": 4}
@@ -176,16 +175,12 @@ class TubeTable:
     """Table of one robot in one tube."""
 
     geometry: RobotGeometry
-    radius: float
-    """R of the tube, m."""
-    packed: Samples = field(repr=False)
-    """For `spirillum.kernels.tube_table.resistance_at`."""
+    radius: float  #: R of the tube, m.
+    packed: Samples = field(repr=False)  #: For `spirillum.kernels.tube_table.resistance_at`.
     error: Mapping[str, float]
     """Largest relative error at check poses with yaw: `forward_velocity`, `body_rotation_rate`, ..."""
-    error_without_yaw: Mapping[str, float]
-    """Largest relative error at check poses without yaw."""
-    places: int
-    """Number of nodes that were solved for."""
+    error_without_yaw: Mapping[str, float]  #: Largest relative error at check poses without yaw.
+    places: int  #: Number of nodes that were solved for.
     seconds: float
     wire: float | None = None
     """Relative error of the forward velocity against the finest form of the wire; None: the largest measured one."""

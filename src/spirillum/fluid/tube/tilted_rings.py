@@ -18,10 +18,8 @@ from spirillum.robot.tube_pose import TubePose
 _FINER = 3
 """Nodes that average waves over a panel, over its own, at least: with 2, normal resistance was 9 % low at a gap of 0.04
 radii."""
-_TIER = 1.6
-"""Ratio of the distances from the wall in one tier of panels."""
-_AVERAGED_TIERS = 3
-"""Tiers near the wall in which waves are averaged over panels."""
+_TIER = 1.6  # Ratio of the distances from the wall in one tier of panels.
+_AVERAGED_TIERS = 3  # Tiers near the wall in which waves are averaged over panels.
 _MOST_VALUES = 500_000
 """Number of waves around rings that are evaluated at once: they fit into the cache, and their memory is reused."""
 
@@ -38,18 +36,13 @@ def _add_product(left: Samples, right: Samples, total: Samples) -> None:
 class _Tier(NamedTuple):
     """Panels at about one distance from the wall: steep waves do not reach those further away."""
 
-    distance: float
-    """Smallest distance from the wall, m."""
-    modes: int
-    """Fourier modes that they bear."""
-    sample: _Sample
-    """Their nodes."""
-    averaged: _Sample
-    """More nodes, and averages over them; near the wall only."""
+    distance: float  #: Smallest distance from the wall, m.
+    modes: int  #: Fourier modes that they bear.
+    sample: _Sample  #: Their nodes.
+    averaged: _Sample  #: More nodes, and averages over them; near the wall only.
     columns: tuple[np.ndarray, ...]
     """[system]: where its unknowns stand among the modes on these panels: component, node, family, mode."""
-    unknowns: tuple[np.ndarray, ...]
-    """[system]: the unknowns that these are."""
+    unknowns: tuple[np.ndarray, ...]  #: [system]: the unknowns that these are.
 
 
 class _Sample(NamedTuple):
@@ -57,8 +50,7 @@ class _Sample(NamedTuple):
 
     x: Samples
     rho: Samples
-    average: Samples | None
-    """From them to the nodes, (panels, p, q); None where they are the nodes."""
+    average: Samples | None  #: From them to the nodes, (panels, p, q); None where they are the nodes.
 
 
 class TiltedRings(Rings):

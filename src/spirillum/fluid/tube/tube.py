@@ -39,22 +39,16 @@ from spirillum.robot.limits import Limit, all_hold, within
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import TubePose
 
-END_LOSS = 1.09
-"""Length of tube over R that the losses at both open ends are worth."""
+END_LOSS = 1.09  #: Length of tube over R that the losses at both open ends are worth.
 _CUT = 0.2
 """Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
-_COARSER = 10.0
-"""Tolerance of the resolution that gives the error estimate, over that of the result."""
-_COARSEST = 0.05
-"""Coarsest tolerance of Fourier modes."""
+_COARSER = 10.0  # Tolerance of the resolution that gives the error estimate, over that of the result.
+_COARSEST = 0.05  # Coarsest tolerance of Fourier modes.
 _ORDERS = ((5e-3, 4), (5e-4, 6), (0.0, 8))
 """Gauss nodes of a panel from which tolerance on: they change the speed by less than the tolerance does."""
-_MOST_FINE_STATIONS = 300
-"""Along a tail with `high` wires, whose equations then cost as much as the solids'."""
-_MOST_WAVES = 1_000_000
-"""Orders and wave numbers together: minutes."""
-_MOST_UNKNOWNS = 11_000
-"""Of one parity: 2 GiB for the factors of both."""
+_MOST_FINE_STATIONS = 300  # Along a tail with `high` wires, whose equations then cost as much as the solids'.
+_MOST_WAVES = 1_000_000  # Orders and wave numbers together: minutes.
+_MOST_UNKNOWNS = 11_000  # Of one parity: 2 GiB for the factors of both.
 
 
 def _near(g: RobotGeometry) -> Samples:

@@ -20,21 +20,16 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-_DECAY = 2.5
-"""Decay rate of a force's flow along the tube, times the radius: images in the sum over k are beyond it."""
+_DECAY = 2.5  # Decay rate of a force's flow along the tube, times the radius: images in the sum over k are beyond it.
 _LOWEST, _MOST_LOWEST, _NEGLIGIBLE = 1e-5, 1e-3, 1e-12
 """First node in k over the step, a tenth of the tolerance between these, and the least k to which the integral below it
 is extrapolated."""
-CROWD = 1.5
-"""Where nodes in k begin to crowd towards 0, over the step."""
-_BANDS = (0.35, 0.65)
-"""Orders over all of them at which a new band begins."""
+CROWD = 1.5  #: Where nodes in k begin to crowd towards 0, over the step.
+_BANDS = (0.35, 0.65)  # Orders over all of them at which a new band begins.
 _FURTHER = 3.0
 """Damping, as an exponent over that at which waves are cut, from which things are out of reach while others are not."""
-SLACK = 3.0
-"""Default of `WallWaves.slack`: what waves beyond it miss is below the error of fine solutions."""
-_AT_WALL = 1e-9
-"""Distance over the radius below which things are at the wall, where every wave reaches them."""
+SLACK = 3.0  #: Default of `WallWaves.slack`: what waves beyond it miss is below the error of fine solutions.
+_AT_WALL = 1e-9  # Distance over the radius below which things are at the wall, where every wave reaches them.
 _THREADS = 2
 _BLOCK = 96  # columns of a symmetric product that are computed at a time
 
@@ -46,16 +41,11 @@ _S = TypeVar("_S")
 class WallWaves:
     """Which waves are kept: nodes in k with their weights, and the number of orders p at each."""
 
-    radius: float
-    """Of the tube, m."""
-    k: Samples
-    """1/m."""
-    weight: Samples
-    """1/m; with the factor 2/pi of the reflection."""
-    orders: tuple[int, ...]
-    """Orders p = 0 to orders - 1."""
-    cut: float
-    """Waves are kept until they are damped by exp(-cut), there and back."""
+    radius: float  #: Of the tube, m.
+    k: Samples  #: 1/m.
+    weight: Samples  #: 1/m; with the factor 2/pi of the reflection.
+    orders: tuple[int, ...]  #: Orders p = 0 to orders - 1.
+    cut: float  #: Waves are kept until they are damped by exp(-cut), there and back.
     slack: float = SLACK
     """Exponent over `cut`, up to which waves are kept between things further from the wall than the nearest: there are
     many of them, and what each lacks adds up to half a percent of what holds and pushes the robot without any."""
@@ -82,12 +72,9 @@ class WallWaves:
 class WaveBand(NamedTuple):
     """Some orders of waves of one k, and what they reach."""
 
-    low: int
-    """First order."""
-    high: int
-    """Order after the last."""
-    there: np.ndarray
-    """Indices of what they reach before they are damped."""
+    low: int  #: First order.
+    high: int  #: Order after the last.
+    there: np.ndarray  #: Indices of what they reach before they are damped.
 
 
 def waves_between(

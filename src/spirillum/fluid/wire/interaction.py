@@ -32,34 +32,25 @@ _EIGHT_PI = 8.0 * np.pi
 class Discretisation:
     """Resolution of the flow."""
 
-    wire: Accuracy = "standard"
-    """Form of the wires."""
-    spacing: float = 1.0
-    """Spacing of the wires' stations, relative to the usual one."""
-    order: int = 10
-    """Gauss nodes of a panel."""
+    wire: Accuracy = "standard"  #: Form of the wires.
+    spacing: float = 1.0  #: Spacing of the wires' stations, relative to the usual one.
+    order: int = 10  #: Gauss nodes of a panel.
     tolerance: float = 1e-5
     """Fourier modes are kept until their share in the interaction of wires and solids falls below this."""
-    most_modes: int = 40
-    """Largest number of modes."""
+    most_modes: int = 40  #: Largest number of modes.
 
 
 @dataclass(frozen=True)
 class UnitTwistSolution:
     """Tractions and forces for each of the 12 unit twists (of the body, then of the rotor), viscosity 1."""
 
-    matrix: Samples
-    """R, 12x12, made symmetric; zero for a part that is not there."""
-    asymmetry: float
-    """Deviation from symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
-    panels: Panels | None = field(repr=False)
-    """Nodes on the solids."""
-    wires: tuple[Wire, ...] = field(repr=False)
-    """The wires."""
+    matrix: Samples  #: R, 12x12, made symmetric; zero for a part that is not there.
+    asymmetry: float  #: Deviation from symmetry (reciprocity), relative to the geometric mean of diagonal entries.
+    panels: Panels | None = field(repr=False)  #: Nodes on the solids.
+    wires: tuple[Wire, ...] = field(repr=False)  #: The wires.
     densities: Amplitudes = field(repr=False)
     """Modes (f_x, f_rho, g) ds/du of the traction on the nodes, complex, (modes, 3 nodes, 12)."""
-    forces: Samples = field(repr=False)
-    """Forces at the wires' stations, (3 stations, 12)."""
+    forces: Samples = field(repr=False)  #: Forces at the wires' stations, (3 stations, 12).
     moments: Samples = field(repr=False)
     """First moments of the forces there, force by displacement, with `high` accuracy, (stations, 3, 3, 12)."""
 
@@ -194,21 +185,15 @@ def surface_motion(panels: Panels, part_of_solid: np.ndarray) -> Amplitudes:
 class _Images:
     """Images: velocity at the wires due to the solids at rest or in motion; all without the factor 1/(8 pi)."""
 
-    resistance: Samples
-    """Of the solids alone, (12, 12)."""
-    mobility: Samples
-    """Reduction of the wires' mobility by the solids at rest; as A of `WireSystem`."""
-    drift: Samples
-    """Velocities and gradients at the stations from the solids' motion; as S of `WireSystem`."""
-    drag: Samples
-    """Forces on the moving solids per force and moment at the stations; equal to `drift` by reciprocity."""
-    moving: Amplitudes
-    """Densities from the solids' motion, (2, 3 nodes, 12)."""
+    resistance: Samples  #: Of the solids alone, (12, 12).
+    mobility: Samples  #: Reduction of the wires' mobility by the solids at rest; as A of `WireSystem`.
+    drift: Samples  #: Velocities and gradients at the stations from the solids' motion; as S of `WireSystem`.
+    drag: Samples  #: Forces on the moving solids per force and moment at the stations; equal to `drift` by reciprocity.
+    moving: Amplitudes  #: Densities from the solids' motion, (2, 3 nodes, 12).
     held: tuple[tuple[np.ndarray, Samples], ...]
     """For each mode the rows (3 nodes of the solids that bear it), and the densities there for ring sources at the
     stations, (rows, stations of 3 forces or 3 forces and 3 torques)."""
-    sources: Sources
-    """Sources at the stations."""
+    sources: Sources  #: Sources at the stations.
 
     @classmethod
     def of(
@@ -251,12 +236,9 @@ class _Images:
 class _Mode(NamedTuple):
     """The single layer in one mode."""
 
-    factors: tuple[Samples, np.ndarray]
-    """LU factors of the matrix."""
-    weight: Samples
-    """Surface element of each row, (rows, 1)."""
-    cross: Samples
-    """Velocities on the surface from ring sources at the stations, (rows, sources)."""
+    factors: tuple[Samples, np.ndarray]  #: LU factors of the matrix.
+    weight: Samples  #: Surface element of each row, (rows, 1).
+    cross: Samples  #: Velocities on the surface from ring sources at the stations, (rows, sources).
 
     def solve(self, velocities: Samples) -> Samples:
         """Densities from velocities."""

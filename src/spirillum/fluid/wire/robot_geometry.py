@@ -18,10 +18,8 @@ from spirillum.robot.tail_form import PLAIN, TailForm
 from spirillum.units import show
 
 _POINTS_PER_TURN = 200
-_SWEPT_CURVE = 1001
-"""Points along what a centre line through points sweeps."""
-_STATION = 20_000.0
-"""Memory of a station while clearances over a turn are sought, bytes."""
+_SWEPT_CURVE = 1001  # Points along what a centre line through points sweeps.
+_STATION = 20_000.0  # Memory of a station while clearances over a turn are sought, bytes.
 PIECES = {
     "body": ("body",),
     "coupling": ("coupling",),

@@ -28,8 +28,7 @@ from spirillum.robot.tail_form import ROOT_SHARE, closest_strands
 FINEST_WIRE_ERROR = 0.004
 """Relative error of speeds with `high` wires: the largest of drag, thrust, torque and speed against resolved wires."""
 
-MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
-"""Stations along a tail, by the form of the wire."""
+MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}  #: Stations along a tail, by the form of the wire.
 _SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
 _SMALLEST_GAP = 0.01  # of the tail from the body, relative to the amplitude
 _SLIMMEST = 1e-3  # thickness of a solid over its length, or length over thickness

@@ -41,12 +41,9 @@ class Panels:
     The unknown density is g = f ds/du: traction times the speed of the outline's parameter.
     """
 
-    x: Samples
-    """(panels, p)."""
-    rho: Samples
-    """(panels, p)."""
-    solid: np.ndarray
-    """Index of the solid of each panel."""
+    x: Samples  #: (panels, p).
+    rho: Samples  #: (panels, p).
+    solid: np.ndarray  #: Index of the solid of each panel.
 
     @property
     def rule(self) -> tuple[Samples, Samples, Samples, Samples, Samples]:
@@ -198,18 +195,12 @@ class Sources:
     Torques are those of the first moments; the moments' strains fade so fast that solids do not feel them.
     """
 
-    wires: tuple[Wire, ...]
-    """Wires."""
-    x: Samples
-    """(stations,)."""
-    rho: Samples
-    """(stations,)."""
-    theta: Samples
-    """(stations,)."""
-    frames: Samples
-    """Rows e_x, e_rho, e_theta, (stations, 3, 3)."""
-    torques: Samples
-    """Cylindrical torque of each unit moment, (stations, 3, q)."""
+    wires: tuple[Wire, ...]  #: Wires.
+    x: Samples  #: (stations,).
+    rho: Samples  #: (stations,).
+    theta: Samples  #: (stations,).
+    frames: Samples  #: Rows e_x, e_rho, e_theta, (stations, 3, 3).
+    torques: Samples  #: Cylindrical torque of each unit moment, (stations, 3, q).
 
     @classmethod
     def of(cls, wires: tuple[Wire, ...], system: WireSystem) -> Sources:

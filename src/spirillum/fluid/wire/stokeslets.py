@@ -26,28 +26,22 @@ Accuracy = Literal["standard", "high"]
 
 _BLOB = float(np.exp(0.5))
 """Blob radius over a: the velocity on a straight wire is that of slender-body theory, along and across."""
-_SPACING = 0.75
-"""Spacing of stations over the blob radius: the smooth kernel's sums are then integrals to 2e-4."""
+_SPACING = 0.75  # Spacing of stations over the blob radius: the smooth kernel's sums are then integrals to 2e-4.
 _INSET = 0.375
 """Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
 solved for with their edges, then have the right drag along and across to 0.4 %."""
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
-_TILT = 0.5
-"""Torque of a tilting cross-section over that of a spinning one; see `_own_torque`."""
+_TILT = 0.5  # Torque of a tilting cross-section over that of a spinning one; see `_own_torque`.
 
 
 @dataclass(frozen=True)
 class Wire:
     """Stations along a wire's centreline; SI."""
 
-    points: Samples
-    """(n, 3), m."""
-    tangents: Samples
-    """Unit tangents, (n, 3)."""
-    lengths: Samples
-    """Arc length of each station, m, (n,)."""
-    radius: float
-    """Radius a of the wire, m."""
+    points: Samples  #: (n, 3), m.
+    tangents: Samples  #: Unit tangents, (n, 3).
+    lengths: Samples  #: Arc length of each station, m, (n,).
+    radius: float  #: Radius a of the wire, m.
 
     @property
     def blob(self) -> float:
@@ -146,14 +140,10 @@ class WireSystem:
     parts is S' f + K V.
     """
 
-    mobility: Samples
-    """A, symmetric positive definite, (3 n + q n, 3 n + q n)."""
-    motion: Samples
-    """S, (3 n + q n, 12)."""
-    own: Samples
-    """K, (12, 12)."""
-    moments: Samples
-    """Tensors of the q first moments at each station, force by displacement, (n, q, 3, 3)."""
+    mobility: Samples  #: A, symmetric positive definite, (3 n + q n, 3 n + q n).
+    motion: Samples  #: S, (3 n + q n, 12).
+    own: Samples  #: K, (12, 12).
+    moments: Samples  #: Tensors of the q first moments at each station, force by displacement, (n, q, 3, 3).
 
     @property
     def torques(self) -> Samples:

@@ -92,8 +92,7 @@ class Evidence:
         self._settings: dict[str, Any] = settings
         computed = [name for name in self.models if SWIMMER_MODELS[name].placed]
         fitted = {name for robot in settings.get("robots", []) for name in robot.get("calibration") or {}}
-        self.computed: tuple[str, ...] = tuple(computed)
-        """Models that compute the channel's walls."""
+        self.computed: tuple[str, ...] = tuple(computed)  #: Models that compute the channel's walls.
         self.confined: tuple[str, ...] = tuple(name for name in self.models if name in computed or name in fitted)
         """Models that depend on the channel: those with walls, and those with factors that represent the walls."""
 

@@ -227,8 +227,7 @@ class _Fit:
         )
         _, self.strip = np.unique(lines.strip, return_inverse=True)
         self.strips = int(self.strip.max()) + 1
-        self.sense = 1.0
-        """1 where the lines are counted towards the nose, -1 where they are counted away from it."""
+        self.sense = 1.0  #: 1 where the lines are counted towards the nose, -1 where they are counted away from it.
         self.scale = _LINE_ERROR * np.sqrt(_CORRELATED)
         self._steps: Samples = np.empty((0, 0))
         """Pseudoinverse of the Jacobian at the fit: change of the parameters by that of the residuals."""

@@ -20,14 +20,10 @@ from spirillum.vision.flag import Flag
 class FalseDetectionConstants:
     """Frames on which something else than the robot was followed."""
 
-    fewest: int = 12
-    """Fewest frames on which stripes or tail are read."""
-    shortest: int = 3
-    """Fewest frames in a row without them."""
-    beside: int = 5
-    """Frames to both sides of a jump whose medians are compared."""
-    jump: float = 0.15
-    """Jump of the place over the body's length."""
+    fewest: int = 12  #: Fewest frames on which stripes or tail are read.
+    shortest: int = 3  #: Fewest frames in a row without them.
+    beside: int = 5  #: Frames to both sides of a jump whose medians are compared.
+    jump: float = 0.15  #: Jump of the place over the body's length.
     leaves: float = 1.0
     """Distance from the path of the marked frames from which on the outline has left the robot, pixels."""
     scatters: float = 6.0
