@@ -415,8 +415,8 @@ def whole_files(folder: Path) -> dict[str, bytes]:
 
     kept, period = run.keep, run._PERIOD
 
-    def copied(number: int, part: Any, parts: Path) -> None:
-        kept(number, part, parts)
+    def copied(number: int, task: Any, part: Any, parts: Path) -> None:
+        kept(number, task, part, parts)
         if not (folder / "part.npz").exists():
             shutil.copy(next(parts.glob("part-*.npz")), folder / "part.npz")
 
