@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from spirillum.files import output_folder
@@ -90,21 +91,23 @@ def draw_together(
 
     `again` returns the same figures in that process.
     """
-    theirs: dict[str, Future[list[Path]]] = {}
-    if beside is not None and again is not None:
-        with suppress(BrokenProcessPool):  # ended from outside, as for want of memory
-            beside.submit(_take_drawings, again)
-            theirs = {name: beside.submit(_draw_taken, name, figures, vector=vector) for name in list(drawings)[1::2]}
-    written: dict[str, list[Path]] = {}
-    for name in (*(name for name in drawings if name not in theirs), *reversed(theirs)):
-        if name not in theirs or theirs[name].cancel():  # of those that the other process has not begun
-            on_progress(name, len(written))
-            written[name] = _drawn(drawings[name], figures / name, vector=vector)
-    for name in drawings.keys() - written.keys():
-        try:
-            written[name] = theirs[name].result()
-        except BrokenProcessPool:
-            written[name] = _drawn(drawings[name], figures / name, vector=vector)
+    with TemporaryDirectory() as elsewhere:  # this process alone writes into the folder: the other one may be ended
+        theirs: dict[str, Future[list[Path]]] = {}
+        if beside is not None and again is not None:
+            with suppress(BrokenProcessPool):  # ended from outside, as for want of memory
+                beside.submit(_take_drawings, again)
+                for name in list(drawings)[1::2]:
+                    theirs[name] = beside.submit(_draw_taken, name, Path(elsewhere), vector=vector)
+        written: dict[str, list[Path]] = {}
+        for name in (*(name for name in drawings if name not in theirs), *reversed(theirs)):
+            if name not in theirs or theirs[name].cancel():  # of those that the other process has not begun
+                on_progress(name, len(written))
+                written[name] = _drawn(drawings[name], figures / name, vector=vector)
+        for name in drawings.keys() - written.keys():
+            if theirs[name].exception() is None:
+                written[name] = _taken_over(theirs[name].result(), figures)
+            else:
+                written[name] = _drawn(drawings[name], figures / name, vector=vector)
     return {name: written[name] for name in drawings}
 
 
@@ -112,6 +115,12 @@ def _drawn(draw: Callable[[], Figure], path: Path, *, vector: bool) -> list[Path
     from spirillum.view.figures.style import save
 
     return save(draw(), path, vector=vector)
+
+
+def _taken_over(files: list[Path], figures: Path) -> list[Path]:
+    from spirillum.view.figures.style import save_drawn
+
+    return save_drawn(files, figures)
 
 
 _TAKEN: dict[str, Callable[[], Figure]] = {}  # Figures of a process that draws beside another one.

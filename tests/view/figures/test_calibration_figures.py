@@ -1,5 +1,7 @@
 """Figures of a calibration show what was observed and fitted, and say what is synthetic."""
 
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +38,16 @@ def drawn(found: Any) -> dict[str, Any]:
         return {"observed": observed_figure(found, 0), "residuals": residual_figure(found)}
 
 
+@pytest.mark.parametrize("ended", [False, True])
 def test_figures_do_not_depend_on_the_number_of_processes(
-    found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ended: bool
 ) -> None:
+    """Nor on whether the other process lives, as for want of memory."""
     monkeypatch.setattr("spirillum.worker_pool.slowdown", lambda _: 1.0)
     with process_beside(load_figures) as beside:
+        assert beside is not None
+        if ended:
+            os.kill(beside.submit(os.getpid).result(), signal.SIGTERM)
         write_calibration(found, tmp_path / "two", beside=beside)
     write_calibration(found, tmp_path / "one")
     names = {path.name for path in (tmp_path / "one" / "figures").iterdir()}

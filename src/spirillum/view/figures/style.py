@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from shutil import copyfile
 from typing import Any
 
 import numpy as np
@@ -196,10 +197,25 @@ def save(figure: Figure, path_without_suffix: Path, *, vector: bool = False) -> 
     save_as(figure, png)
     if vector:
         save_as(figure, svg)
-    elif svg.is_file() and written_by_us(svg):
-        svg.unlink()
+    else:
+        _drop_earlier(svg)
     figure.set_layout_engine(engine)
     return [png, svg] if vector else [png]
+
+
+def save_drawn(files: Sequence[Path], folder: Path) -> list[Path]:
+    """Write files of one figure that `save` has written elsewhere as it would have written them into a folder."""
+    for file in files:
+        with atomic_write(folder / file.name) as temporary:
+            copyfile(file, temporary)
+    if all(file.suffix != ".svg" for file in files):
+        _drop_earlier(folder / f"{files[0].stem}.svg")
+    return [folder / file.name for file in files]
+
+
+def _drop_earlier(svg: Path) -> None:
+    if svg.is_file() and written_by_us(svg):
+        svg.unlink()
 
 
 def save_as(figure: Figure, path: Path) -> None:
