@@ -1,9 +1,12 @@
-"""Frames without marks, from which the place jumps to the robot's, are left out; a robot without marks stays."""
+"""Frames without marks, from which the place jumps to the robot's, are left out; a robot without marks stays.
+
+A robot at two places has no speed.
+"""
 
 import numpy as np
 import pytest
 
-from spirillum.vision.track.false_detection import something_else, something_else_flag
+from spirillum.vision.track.false_detection import far_apart, something_else, something_else_flag
 
 LENGTH, PIXEL = 0.04, 2.5e-4
 TIME = np.arange(150) / 30.0
@@ -67,3 +70,25 @@ def test_a_robot_that_goes_on_after_a_cut_without_marks_is_left_out_but_not_befo
     place[51:70] += (0.0, 0.01)
     marked[51:70] = False
     assert np.flatnonzero(other(place, marked)).tolist() == list(range(51, 70))
+
+
+@pytest.mark.parametrize("at", [6, 75, 143])
+@pytest.mark.parametrize("jump", [0.03, -0.045])
+@pytest.mark.parametrize("unseen", [0, 40])
+def test_a_robot_at_two_places_has_no_speed(at: int, jump: float, unseen: int) -> None:
+    x = way()[:, 0]
+    x[at:] += jump
+    x[at - unseen // 2 : at + unseen // 2 if at == 75 else at] = np.nan
+    flags = far_apart(TIME, x, LENGTH)
+    assert [flag.name for flag in flags] == ["something-else-followed"]
+    assert "forward_velocity" in flags[0].spoils
+    assert flags[0].frame == np.flatnonzero(np.isfinite(x) & (np.arange(TIME.size) >= at))[0]
+
+
+def test_strays_other_edges_and_ways_that_nobody_saw_are_no_second_place() -> None:
+    strays, edge, unseen = way()[:, 0], way()[:, 0], 60.0 * way()[:, 0]
+    strays[40:60] += 0.03
+    edge[75:] += 0.45 * LENGTH
+    unseen[50:100] = np.nan
+    for x in (way()[:, 0], strays, edge, unseen, np.full(TIME.size, np.nan)):
+        assert far_apart(TIME, x, LENGTH) == ()

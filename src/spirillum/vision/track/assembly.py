@@ -23,14 +23,14 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
-from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
-from spirillum.vision.track.false_detection import something_else, something_else_flag
+from spirillum.vision.track.cuts import Hops, clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
+from spirillum.vision.track.false_detection import far_apart, something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection, learnt_from
 from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
 from spirillum.vision.track.size import LENGTHS, AlignedTrack, align_with_path, checked_scale
-from spirillum.vision.track.steadiness import camera_flags, picture_steps
+from spirillum.vision.track.steadiness import PictureSteps, camera_flags, picture_steps
 from spirillum.vision.track.steps import FrameDetection, FrameTracker, Record
 from spirillum.vision.track.track import CUES, Agreement, RobotMotion, Track, agreement_of
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
@@ -172,19 +172,18 @@ def track_of(
         roll_flags = (*roll_flags, _DOUBTFUL_OUTLINE if roll_error else _DOUBTFUL_SCALE)
     hand = known.wire.handedness()
     motion, pixel = RobotMotion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
-    odd = contradictions(motion, body.robot, hand)
-    odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     agreement = _agreement(time, record, cut | other, pixel, outline.suspect)
     lag = math.hypot(agreement.drift, _colour_lag(position[:, 0], body), outline.drift * pixel)
-    glare, hops = learnt.glare.drift * pixel, hops_in(motion, pixel, picture)
+    cuts, hops, motion = _jumps_of(motion, pixel, picture, body.robot.body.length)
+    glare, odd = learnt.glare.drift * pixel, contradictions(motion, body.robot, hand)
+    odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
         gap_flags = ()  # by times that are wrong
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
-    cuts = (
-        *cuts_in(motion, pixel, picture),
+    cuts += (
         *hops.flags,
         *clock.flags,
         *one_picture(motion),
@@ -218,6 +217,16 @@ def track_of(
         cue_drift=lag,
         flags=(*swayed.flags, *early, *agreement.flags, *outline.flags, *cuts, *roll_flags, *tail_flags, *odd),
     )
+
+
+def _jumps_of(
+    motion: RobotMotion, pixel: float, picture: PictureSteps | None, length: float
+) -> tuple[tuple[Flag, ...], Hops, RobotMotion]:
+    """Flags of a robot that jumps, hops of its outline, and its motion without a place that tells nothing then."""
+    cuts = cuts_in(motion, pixel, picture)
+    flags = cuts or far_apart(motion.time, motion.x, length)
+    told = motion._replace(x=np.full(motion.time.size, np.nan)) if flags else motion
+    return flags, hops_in(motion if cuts else told, pixel, picture), told
 
 
 def _agreement(time: Samples, record: Record, left_out: np.ndarray, pixel: float, suspect: str) -> Agreement:

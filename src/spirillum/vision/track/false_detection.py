@@ -2,7 +2,8 @@
 
 Where a still picture hides a slow robot, or clutter looks like a body, the outline may lie beside the robot for a
 while and then find it. Over a grid it stays behind where the robot is hidden or taken away. Neither stripes nor tail
-can be read meanwhile, as they are looked for where they are not.
+can be read meanwhile, as they are looked for where they are not. A robot that is at two places, too far apart for it to
+have swum from one to the other, is found in a video of which a piece is missing, or is not the same robot.
 """
 
 from __future__ import annotations
@@ -10,10 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from spirillum.arrays import Samples
 from spirillum.robust import mad_scale, repeated_median_line, stretches_of
+from spirillum.units import show
 from spirillum.vision.flag import Flag
+from spirillum.vision.track.size import LENGTHS
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,8 @@ class FalseDetectionConstants:
     """Distance from the path of the marked frames from which on the outline has left the robot, pixels."""
     scatters: float = 6.0
     """Distance from which on it has left the robot, over the scatter of the marked frames about their path."""
+    apart: float = 0.5
+    """Lasting jump of the place over the body's length that no other edge of the same robot explains."""
 
 
 FALSE_DETECTION = FalseDetectionConstants()
@@ -79,3 +85,35 @@ def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
         "beside the robot's path: they are left out; a [region] around the path avoids it"
     )
     return (Flag("something-else-followed", sentence),)
+
+
+def far_apart(time: Samples, x: Samples, length: float) -> tuple[Flag, ...]:
+    """Flag a robot that is at two places, before and after a jump that is too long for another edge of its own.
+
+    Where it comes back, what was followed in between is left out as stray frames.
+
+    Args:
+        time: of each frame, s, (n,).
+        x: along the channel, m, (n,); NaN where unknown.
+        length: of the body, m.
+    """
+    known, few, allowed = np.flatnonzero(np.isfinite(x)), FALSE_DETECTION.beside, FALSE_DETECTION.apart * length
+    if known.size < 2 * few:
+        return ()
+    t, place = time[known], x[known]
+    speed = float(np.median(np.diff(place) / np.diff(t)))
+    beside = place - speed * t
+    level = np.median(sliding_window_view(beside, few), axis=1)
+    unseen = t[few : 1 - few] - t[few - 1 : -few]
+    steps = np.abs(level[few:] - level[:-few]) - abs(speed) * unseen  # it may have stopped while it was not seen
+    largest = int(np.argmax(steps))
+    if steps[largest] <= allowed or abs(level[-1] - level[0]) <= allowed:
+        return ()
+    around = np.abs(np.diff(beside[largest : largest + 2 * few]))
+    frame = int(known[largest + 1 + np.argmax(around)])
+    sentence = (
+        f"the robot is at two places {show(float(steps[largest]), 'mm')} apart before and after {time[frame]:.2f} s "
+        f"(frame {frame}): a piece of the video is missing, or something else was followed; no speed is given: choose "
+        "one of both parts (start and end of the setup)"
+    )
+    return (Flag("something-else-followed", sentence, LENGTHS, frame),)

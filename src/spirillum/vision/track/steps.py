@@ -112,7 +112,7 @@ class FrameTracker:
             return None
         times, places = record.time[-FOLLOWING.memory :], record.placed[-FOLLOWING.memory :]
         last = [(at, one.pose) for at, one in zip(times, places, strict=True) if one.known]
-        return None if len(last) < 2 else pose_on_path(last, time)
+        return last[0][1] if len(last) == 1 else pose_on_path(last, time)
 
     def _expected(self, time: float) -> BodyPose:
         """Where it should be by the first look; in frames that are new, where it was last."""
