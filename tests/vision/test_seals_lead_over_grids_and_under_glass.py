@@ -8,13 +8,16 @@ import pytest
 from remembered import remembered
 from spirillum.live.tracker import LiveTracker
 from spirillum.measurement.trials import trial_of
-from spirillum.vision.camera.optics import Optics
+from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.setup import load_setup
+from spirillum.vision.track import initial_detection
 from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import EDGE_CUES
-from spirillum.vision.track.initial_detection import SealSearch
+from spirillum.vision.track.initial_detection import SealSearch, detect_robot
+from spirillum.vision.track.size import OutlineFit
 from spirillum.vision.track.track import agreement_of, cue_shifts
+from spirillum.vision.video.frames import Frame
 
 cv2 = pytest.importorskip("cv2")
 pytestmark = pytest.mark.usefixtures("learning_shared")
@@ -191,3 +194,14 @@ def test_cues_that_move_apart_widen_the_speed_by_their_mixture():
     assert agreement.cues["tail"].share == 1.0
     alike = [one * np.array([0.0, 1.0]) for one in shifts]
     assert agreement_of(time, alike, np.zeros(31), pixel).flags == ()
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0])
+def test_an_outline_that_does_not_settle_gives_way_to_the_seal(film, monkeypatch, off):
+    """Between both rims of a glass cover over a dark liner it moves to and fro."""
+    frames = [Frame(k, time, film.draw(time)) for k, time in enumerate(film.times.tolist())]
+    body = BodyFinder(film.robot, CAMERA, (0, 0, *film.size), colours=4)
+    move = BodyPose(0.0, off * CAMERA.length_per_pixel, 0.0)
+    monkeypatch.setattr(initial_detection, "outline_seen", lambda *_: OutlineFit(1.0, move))
+    start = detect_robot("film", body, frames, np.zeros((*film.size[::-1], 3)), colours=4)
+    assert bool(start.body.colours) == (off > 0.0)

@@ -280,8 +280,9 @@ def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _L
         return None
     other = learnt._replace(poses=[one.pose for one in found])
     apart = np.array(other.poses)[:, 0] - poses[:, 0]
-    alike = abs(outline_seen(plain, other.typical).size - size) < SEAL.agreement
-    if not alike or float(np.std(apart)) > SEAL.apart * pixel:
+    outline = outline_seen(plain, other.typical)
+    settled = outline._replace(size=1.0).fits(pixel)  # it does not between the rims of a glass cover and a dark liner
+    if not settled or abs(outline.size - size) > SEAL.agreement or float(np.std(apart)) > SEAL.apart * pixel:
         return None
     return plain, other._replace(whole=[one.inside >= VISIBILITY.full_view for one in found])
 
