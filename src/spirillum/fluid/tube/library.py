@@ -160,6 +160,7 @@ class TabledTube(Tube):
         """Evaluate from tables."""
         super().__init__()
         self._tables = tables
+        self._known: tuple[RobotBatch, tuple[Samples, Samples]] | None = None
         coarsest = min(tables.values(), key=lambda table: list(STAGES).index(table.stage), default=None)
         self.error_against = None if coarsest is None else coarsest.error_against
 
@@ -196,6 +197,13 @@ class TabledTube(Tube):
         return pose_limits(batch, part, unbounded, thinnest_gap=THINNEST_GAP, wire_film=0.0)
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
+        """Resistance, load and mean flow are asked for one after the other: those of the last batch are kept."""
+        known = self._known
+        if known is None or known[0] is not batch:
+            self._known = known = batch, self._evaluated(batch)
+        return known[1]
+
+    def _evaluated(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)
         for index in within(batch, self.part_domain(batch, "robot")):
             pose, mean = pose_of(batch, index), np.empty((MOTIONS, MOTIONS))
