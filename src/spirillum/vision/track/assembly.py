@@ -215,6 +215,7 @@ def track_of(
         tail_phase_drift=math.hypot(hops.phase, 2.0 * np.pi * lag / body.robot.tail.wavelength),
         cues=agreement.cues,
         cue_drift=lag,
+        sideways=np.where(cut | other, np.nan, [one.sideways for one in record.placed]),
         flags=(*swayed.flags, *early, *agreement.flags, *outline.flags, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

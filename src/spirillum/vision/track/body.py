@@ -32,6 +32,8 @@ class PoseFit(NamedTuple):
     """By how much nose and rear lie farther apart than the level body's edges do, m; NaN without edges at both."""
     cues: Samples | None = None
     """Displacement of each cue of edges from the pose, and its standard error: see `cue_shifts`; None if unknown."""
+    sideways: float = np.nan
+    """Displacement of the seal's flanks from the pose, across the channel, m; NaN where they are hidden."""
 
     @property
     def known(self) -> bool:
@@ -93,6 +95,7 @@ class BodyFinder:
         self._cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
         self._ends = group == GROUPS.index("front"), np.isin(group, [GROUPS.index("rear"), GROUPS.index("seal")])
         flank = np.isin(group[self._on_seal], [GROUPS.index("left"), GROUPS.index("right")])
+        self._flanks = [np.flatnonzero(group[self._on_seal] == GROUPS.index(side)) for side in ("left", "right")]
         self._seal_floor = np.where(flank, SEAL.floors[1], SEAL.floors[0])
         self._seal_scatter = self._seal_floor.copy()
         self.margin = int(self.half + 4 * OUTLINE.blur + 4)
@@ -367,7 +370,19 @@ class BodyFinder:
         left = shifts - slopes @ change
         elongation = _elongation(left[:count], slopes[:count], used[:count], *self._ends)
         spread = max(level, 0.5) * np.sqrt(self._correlation)
-        return PoseFit(found, errors, fitting, share, elongation, cue_shifts(left, slopes, used, self._cue, spread))
+        cues = cue_shifts(left, slopes, used, self._cue, spread)
+        return PoseFit(found, errors, fitting, share, elongation, cues, self._sideways(left, slopes, known))
+
+    def _sideways(self, left: Samples, slopes: Samples, known: np.ndarray) -> float:
+        """Displacement of the seal's flanks across the channel from what is `left` of all edges, m; NaN if hidden."""
+        if self.seal is None:
+            return np.nan
+        first, found = len(self.contour.group), []
+        for side in self._flanks:
+            mine = first + side[known[first + side]]
+            if mine.size >= SEAL.fewest_of_side:
+                found.append(float(np.median(left[mine] / slopes[mine, 1])))
+        return float(np.mean(found)) if found else np.nan
 
 
 def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:

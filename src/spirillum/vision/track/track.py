@@ -147,3 +147,5 @@ class Track:
     """Outline, seal, coupling and tail: how often each was used, and whether they agree; empty where unknown."""
     cue_drift: float = 0.0
     """Standard error of the displacement from end to end by cues that disagree, and by colours that lag, m."""
+    sideways: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
+    """Distance of the seal from the pose across the channel, m, (n,); empty where no pose was fitted."""
