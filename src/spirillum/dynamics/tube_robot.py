@@ -36,7 +36,7 @@ _LINE_STATIONS_PER_TURN = 64  # Where the wire is a cubic between them: off by l
 class Surroundings:
     """What surrounds a robot in its tube."""
 
-    ends: int = core.CLOSED  #: `kernel.CLOSED`, `kernel.OPEN` or `kernel.IMPOSED`.
+    ends: int = core.CLOSED  #: `CLOSED`, `OPEN` or `IMPOSED`.
     length: float = np.inf  #: L_eff of open ends, m.
     flow: Samples = field(default_factory=lambda: np.zeros((1, 2)))
     """Imposed mean flow: times, s, and velocities, m/s, (k, 2); straight between them, constant beyond."""

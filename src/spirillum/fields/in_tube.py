@@ -123,7 +123,7 @@ class TubeFlowField(FluidField):
         return _Reflection.of(self.held.strengths, self._density, self._forces)
 
     def _unbounded(self, turned: Samples) -> Samples:
-        """The flow without the wall, as `kernels.stokes_flow` has it, (n, 4)."""
+        """The flow without the wall, as csrc/field.c has it, (n, 4)."""
         strengths, field = self.held.strengths, np.zeros((len(turned), 4))
         layer = strengths.solids.panels, self._density
         add_tractions(turned, strengths.wires, self._forces, layer, field)
@@ -150,7 +150,7 @@ class _Sources(NamedTuple):
 
 @dataclass(frozen=True)
 class _Reflection:
-    """Reflection at the wall: waves and their amplitudes, see `kernels.stokes_flow`."""
+    """Reflection at the wall: waves and their amplitudes, see csrc/tube_field.c."""
 
     radius: float
     waves: tuple[Samples, np.ndarray]  #: k, 1/m, and number of orders p of each.
@@ -161,7 +161,7 @@ class _Reflection:
     middle: float  #: Between both ends of the robot, along the tube, m.
     reach: float  #: Where, from there, the flow has died out, m.
     steps: Samples
-    amplitudes: Samples  #: Of `kernels.stokes_flow.wave_amplitudes`.
+    amplitudes: Samples  #: Of `core.wave_amplitudes`.
 
     @classmethod
     def of(cls, strengths: Strengths, density: Amplitudes, forces: Samples) -> _Reflection:

@@ -2,7 +2,7 @@
 
 A force at y moves the fluid at x, besides by the Stokeslet, by -2/pi int dk sum_p eps_p U_p(x) S_p U_p(y)', over
 k > 0 and the even and odd waves of order p, with eps_0 = 1, else 2, and without the factor 1/(8 pi mu); see
-`kernels.stokes_flow`. No net flux passes along the tube. Near k = 0 the integrand goes as A + B log k: the nodes in k
+csrc/tube_waves.c. No net flux passes along the tube. Near k = 0 the integrand goes as A + B log k: the nodes in k
 crowd there, and below the first of them it is extrapolated in log k.
 
 Axes here: x along the tube, y up, z to the right; angles count from y.

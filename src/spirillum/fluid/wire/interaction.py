@@ -4,7 +4,7 @@ Unknowns are the Fourier modes of the traction on the solids of revolution (`rev
 wires (`wire`). The modes decouple on the solids; eliminating them one by one leaves a symmetric positive definite
 system for the wires' forces. Its solution gives the 12x12 resistance matrix, constant in the tail's frame.
 
-Real fields are written as Re sum_m c_m exp(i m theta), m >= 0, with f_theta = i g; see `kernels.stokes_flow`.
+Real fields are written as Re sum_m c_m exp(i m theta), m >= 0, with f_theta = i g; see csrc/rings.c.
 """
 
 from __future__ import annotations
