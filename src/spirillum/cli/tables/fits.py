@@ -97,7 +97,7 @@ def _failures(item: Answer) -> str:
     """Where a model fails, on the scale of what its own fit expects of a tail."""
     rows = item["fails_most_at"]
     places = [
-        f"{row['tail']} ({row['quantity'].replace('_', ' ')}: observed "
+        f"{row['tail']} ({CALLED[row['quantity']]}: observed "
         f"{100 * (row['observed_over_predicted']['value'] - 1):+.0f} %, "
         f"{abs(row['standard_deviations']['value']):.1f} standard deviations)"
         for row in rows
