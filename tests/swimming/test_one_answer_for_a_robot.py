@@ -95,7 +95,7 @@ def test_one_place_without_a_table_says_what_a_table_adds() -> None:
     found = sp.predict(robot, tail_rate="1.2 Hz", placement={"gap": "4 mm"})
     assert found.answered_by["form"] == "direct"
     assert found.band is None
-    assert any(said.startswith("pitch is unknown") and "`prepare` adds band" in said for said in found.warnings)
+    assert any(said.startswith("pitch is unknown") and "`spirillum prepare ROBOT`" in said for said in found.warnings)
 
 
 def test_other_models_say_what_they_say_alone(answer: Any) -> None:

@@ -81,7 +81,7 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     if not has_table(batch) and not why_no_table(batch):
         whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
         band = band.partition(" on ")[0]
-        more = f"`prepare` adds band, trial and steady in {whole} (--stage straight: the band in {band})"
+        more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
     return [Note.named("pose-open", open=named, more=more, fields=over)]
 
 
