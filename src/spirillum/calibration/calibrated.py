@@ -55,8 +55,7 @@ class Calibrated(DisplayMixin):
     friction_statement: str  #: What the intervals of B_eff take as exact, in a sentence; empty where there is no B_eff.
     predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
     """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
-    discrepancy: dict[Quantity, Estimate]
-    """Relative misfit of the model from robot to robot, beyond the scatter of the trials."""
+    discrepancy: dict[Quantity, Estimate]  #: Relative misfit of the model by robot, beyond the scatter of trials.
     error: dict[Quantity, float]  #: Relative error of one trial.
     least_squares: LeastSquares | None
     posterior: Posterior | None

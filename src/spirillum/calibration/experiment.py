@@ -38,11 +38,9 @@ from spirillum.swimming.drawn_resistance import error_of_mean
 
 Quantity = Literal["advance", "turning", "motor_rate"]  #: U/omega (or U/omega_m), Omega/omega, omega_m.
 
-_FEWEST_EQUAL = 3
-"""Rows of equal speed that were not measured, if they are of that many tails, or have that many digits."""
+_FEWEST_EQUAL = 3  # rows of equal speed that were not measured, if of that many tails or with that many digits
 _NEAR_ZERO = 3.0  # standard errors within which a mean may be backwards by chance
-_FLOOR = 0.1
-"""Smallest scale of a relative error, over the median of all robots: a mean near zero has no relative error."""
+_FLOOR = 0.1  # smallest scale of a relative error, over the median of all robots: a mean near zero has none
 
 
 @dataclass(frozen=True)
@@ -54,8 +52,7 @@ class Ratio:
     scale: Samples  #: What the error of a trial is relative to: the mean's size.
     squares: Samples  #: Sum of squares of the trials' deviations from the mean, over the scale squared.
     freedom: Samples  #: Degrees of freedom of that sum.
-    stated: Samples
-    """Relative standard error of one trial as the file states it, over the scale; NaN where it does not."""
+    stated: Samples  #: Relative standard error of one trial in the file, over the scale; NaN where it states none.
 
     def error_of_mean(self, error: Samples | float) -> Samples:
         """Standard error of each mean, SI, from the relative error of one trial; NaN where it is unknown."""
@@ -102,8 +99,7 @@ class Experiment:
     turning: Ratio  #: Omega/omega.
     motor_rate: Ratio  #: omega_m, rad/s.
     tail_rate: Samples
-    correlation: float
-    """Between the errors of advance and turning within a robot's trials, which share their tail rate."""
+    correlation: float  #: Between the errors of advance and turning in a robot's trials, which share their tail rate.
     source: str
     sha256: str
     synthetic: bool  #: Whether the file states that its numbers are synthetic.

@@ -20,21 +20,18 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robust import mad_scale
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
 
-RATES_IN_RADIANS = Note.named("rates-in-radians")
-"""Caution where most of the robots would need more torque than their motors give."""
+RATES_IN_RADIANS = Note.named("rates-in-radians")  #: Where most robots need more torque than their motors give.
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 """Name of each compared quantity in a sentence."""
 _LARGE_MISFIT = 0.03  # relative misfit from which on a warning states it
 _BEYOND_TRIALS = 2.0 * ERROR_SCALE  # discrepancy larger than any plausible relative error of a trial
-_IMPLAUSIBLE_FACTOR = 10.0
-"""Median misfit, as a factor, beyond which observations and model must differ in robot or units."""
+_IMPLAUSIBLE_FACTOR = 10.0  # median misfit, as a factor, beyond which observations and model differ in robot or units
 _PRINTED = 0.1  # relative difference of the body's rates beyond which a friction model contradicts the observations
 _IMPLAUSIBLE_DISTANCE = 5.0  # standard deviations from the median of a wide prior beyond which a fit is refused
 _WIDE = 0.5  # smallest logarithmic standard deviation of a prior that is called wide
 _EDGE, _PILED = 0.05, 0.4
 """Outermost share of a bounded prior, and the share of a posterior in it from which on its end decides the interval."""
-_OUTLYING, _LEAST_OUTLYING = 6.0, 0.2
-"""Robust standard deviations, and relative deviation, beyond which a robot is named as an outlier."""
+_OUTLYING, _LEAST_OUTLYING = 6.0, 0.2  # robust standard deviations, and relative deviation, of an outlying robot
 
 
 def check_plausible(problem: Problem, z: Samples) -> None:

@@ -33,18 +33,14 @@ from spirillum.units import display_unit, in_unit
 
 _STARTS = 6
 _STEP = 1e-4  # step of the central differences, in standard deviations of the prior
-_SMALL_STEP = float(np.sqrt(np.finfo(float).eps))
-"""Step of the forward differences during the fit, relative to coordinates above one."""
+_SMALL_STEP = float(np.sqrt(np.finfo(float).eps))  # of forward differences, relative to coordinates above one
 _BLIND = 1e-8  # relative change of a prediction by one standard deviation of a prior that is none but rounding
 LARGEST = 12.0  #: Standard deviations of the prior to either side within which a fit looks.
-_BREATH = 1e-2
-"""Weight of the prior in the first fit: it holds a number that nothing observed holds, and moves no other."""
+_BREATH = 1e-2  # weight of the prior in the first fit: it holds a number that nothing observed holds, and no other
 FEWEST_LEFT = 0.5  #: Degrees of freedom below which a fit leaves no residual to judge the model by.
 _MIDDLE = 0.6745  # median of a half-normal number over its scale
-_SHARP = 0.01
-"""Relative error assumed for all observations when the number of parameters that a quantity constrains is counted."""
-LEAST_ERROR = 1e-3
-"""Relative error that no mean is known better than: else one quantity that happens to fit would outweigh the others."""
+_SHARP = 0.01  # relative error assumed of all observations to count the parameters that a quantity constrains
+LEAST_ERROR = 1e-3  #: Relative error that no mean is known better than: else one would outweigh all others.
 
 
 @dataclass(frozen=True)

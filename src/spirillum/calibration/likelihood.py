@@ -22,12 +22,9 @@ from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.problem import Problem
 
-DISCREPANCY_SCALE = 0.3
-"""Scale of the half-normal prior of a discrepancy: models of this kind miss by up to some tens of per cent."""
-ERROR_SCALE = 0.05
-"""Scale of the half-normal prior of a trial's relative error: more than a tenth would be a poor measurement."""
-LEAST_RELATIVE = 1e-4
-"""Relative error below which no mean is taken for known: observations are written with a few digits."""
+DISCREPANCY_SCALE = 0.3  #: Scale of the half-normal prior of a discrepancy: such models miss by some tens of per cent.
+ERROR_SCALE = 0.05  #: Scale of the half-normal prior of a trial's relative error: above 0.1 a trial would be poor.
+LEAST_RELATIVE = 1e-4  #: Relative error below which no mean is taken for known: files have a few digits.
 _NOTHING = -1e30  # log density where there is none: finite, for the sampler takes differences
 _LARGEST = 8.0  # coordinates beyond this many standard deviations of the prior have no density
 

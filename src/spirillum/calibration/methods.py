@@ -5,5 +5,4 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 Method = Literal["posterior", "least-squares", "paper"]
-METHODS: tuple[Method, ...] = get_args(Method)
-"""Draws of the posterior, its most probable values, or the paper's own method."""
+METHODS: tuple[Method, ...] = get_args(Method)  #: Draws of the posterior, its most probable values, or the paper's.

@@ -100,8 +100,7 @@ def _parameters() -> Iterator[FitParameter]:
 
 PARAMETERS = {parameter.name: parameter for parameter in _parameters()}  #: All parameters by name.
 
-UNWALLED = "sbt"
-"""Model that is fitted where `auto` cannot take one with walls: the paper's, with factors on the body's drag."""
+UNWALLED = "sbt"  #: Model that is fitted where `auto` can take none with walls: the paper's, with factors on drag.
 DEFAULT_FREE = {
     **dict.fromkeys(CALIBRATED, ("body_drag", "body_rotation", "friction")),
     "rft": ("body_drag", "friction"),

@@ -69,8 +69,7 @@ class Problem:
     interpolation_error: float
     """Relative error of interpolated resistances, that no prediction is taken to be better than; 0 without any."""
     fixed_friction: Samples  #: B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset.
-    trials: TrialSurfaces | None = None
-    """Observables of trials, where these are fitted; None for a fit of held motion."""
+    trials: TrialSurfaces | None = None  #: Observables of trials, where these are fitted; None: held motion is.
     assumed: Mapping[str, float] = field(default_factory=dict)
     """Parameter to its stated uncertainty, half of a relative 95 % interval: a prior where it is free, else a share of
     the interval of B_eff alone."""

@@ -34,8 +34,7 @@ from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.swimming.model_choice import WALLED
 from spirillum.swimming.released_motion import HELD, RELEASED
 
-_CLEAR = 4.0
-"""Difference of the expected log density, over its standard error, from which one model is better without doubt."""
+_CLEAR = 4.0  # difference of the log density, over its standard error, from which a model is better without doubt
 _PARETO = 0.7  # largest shape of the importance weights' tail at which leaving a robot out can be trusted
 _MOST_BAD = 0.5  # share of the robots with a larger one above which no model is named the better
 _FEWEST_ROBOTS = 4  # below that number a standard error over the robots is chance, and no model is named the better

@@ -57,8 +57,7 @@ class Uncertainty:
     draws: int  #: Number of draws from which it is stated; none of them was used in the search.
     low: Mapping[str, float]  #: Lower ends of the 95 % intervals of all quantities, SI.
     high: Mapping[str, float]
-    probability: tuple[float, float, float] | None
-    """Probability that the target is met, with its 95 % interval; None without a target."""
+    probability: tuple[float, float, float] | None  #: That the target is met, with its 95 % interval; None without one.
     deciding: Mapping[str, float]
     """Unknown to the share of the objective's spread that goes with it: squared rank correlation over the draws."""
 
@@ -91,15 +90,13 @@ class Design(DisplayMixin):
     profiles: tuple[ObjectiveProfile, ...] = field(repr=False)
     front: Mapping[str, Samples] | None = field(repr=False)
     """With two objectives, designs of which none is better in both: fields and both objectives, (points,)."""
-    searched: Evaluation = field(repr=False, compare=False)
-    """Designs under the draws of the search, for further analysis."""
+    searched: Evaluation = field(repr=False, compare=False)  #: Designs under the draws of the search.
     bound_by: tuple[str, ...]  #: What the best design touches: ends of ranges and conditions.
     swum: int
     refused: int
     breaking: int
     warnings: tuple[Note, ...]
-    learned: Learned | None = None
-    """Accuracy of a model that solves for the flow; None where it was evaluated for every design."""
+    learned: Learned | None = None  #: Accuracy of a model that solves for the flow; None: it solved for every design.
     model_reason: str = ""  #: Reason of the model, in half a sentence; empty where it was named.
     leading: tuple[Samples, ...] = field(default=(), repr=False)
     """The best design and the next ones, at least a tenth of a range apart: positions in the ranges, (variables,)."""

@@ -30,8 +30,7 @@ class SampledRobots(NamedTuple):
     batch: RobotBatch  #: A robot for each draw, or one robot where everything is known.
     values: Mapping[str, Samples]  #: Unknown to its values, (draws,).
     number: int
-    sets: int = 1
-    """Number of sets that fill the ranges evenly, each by itself and independent of the others, one after the other."""
+    sets: int = 1  #: Number of independent sets that each fill the ranges evenly, one after the other.
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,7 @@ def unknowns_of(
     return Unknowns(robot, tuple(variable_of(robot, path, given, "unknown") for path, given in (unknown or {}).items()))
 
 
-REFUSED = 1e6
-"""Score of a design that cannot be built, to which what it breaks is added: worse than any condition that is broken."""
+REFUSED = 1e6  #: Score of a design that cannot be built, plus what it breaks: worse than any broken condition.
 BROKEN = 1e3  #: Score of a design that breaks a condition, to which the excess is added: worse than any that keeps all.
 _MOST = 1e2
 _TIE = 1e-6  # weight of the mean excess beside a probability, which does not change between neighbouring designs
@@ -161,8 +159,7 @@ class DesignScores(NamedTuple):
     """What some designs are worth."""
 
     cost: Samples  #: To be minimised by one objective, what is broken added, (objectives, designs).
-    values: Samples
-    """Statistic of every objective; NaN for a design that is refused or breaks a condition, (objectives, designs)."""
+    values: Samples  #: Of every objective; NaN for a design refused or breaking a condition, (objectives, designs).
     refused: Flags  #: Whether a design cannot be built or has no answer, (designs,).
 
 

@@ -44,8 +44,7 @@ _COLUMNS = {
 _FREE = ("fluid.", "friction.", "motor.", "battery.", "drive.")  # fields that the correction does not depend on
 _MOST_FIELDS = 3
 _UPPER = np.triu_indices(3)
-_PLACES = np.array([0, 1, 3])
-"""U, Omega and omega in the axial form of both parts; the force on the whole stands with the body."""
+_PLACES = np.array([0, 1, 3])  # U, Omega, omega in the axial form of both parts; the whole's force stands with the body
 
 
 @dataclass(frozen=True)
@@ -251,8 +250,7 @@ def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variab
 _AGREES = 2e-3  # relative difference of the objective, learned and solved, at which the search ends
 _ROUNDS = 5
 _CANDIDATES = 64
-_FEWEST, _FOR_EACH = 4, 3
-"""Designs that are solved before the first search: so many, and for each field of the tail so many more."""
+_FEWEST, _FOR_EACH = 4, 3  # designs solved before the first search: so many, and so many for each field of the tail
 
 Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 

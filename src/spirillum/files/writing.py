@@ -26,8 +26,7 @@ PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
 """Endings of the pictures that can be written, for `output_target`."""
 MARK = "written by spirillum"
 """Ownership mark of every file that may be replaced: at its end (`_AT_THE_END`), or in its title, comment or head."""
-Replace: TypeAlias = Literal["own", "any", "none"]
-"""What a new file may replace: this program's own files, any regular file, or nothing."""
+Replace: TypeAlias = Literal["own", "any", "none"]  #: What may be replaced: own files, any regular file, nothing.
 
 _XML = f"<!-- {MARK} -->\n".encode()
 _FREE_BOX = (8 + len(MARK)).to_bytes(4, "big") + b"free" + MARK.encode()

@@ -47,10 +47,8 @@ class Fit:
     posterior: PosteriorFile | None = None
     file: CalibrationFile | None = None
     name: str = ""  #: Name of the file, with the observations of a posterior.
-    channels: tuple[float, ...] = ()
-    """Diameters of the channels in which it was fitted, m; none where the file does not state them."""
-    friction_coefficient: float | None = None
-    """Coefficient of dry friction under a robot that was fitted; None: none was."""
+    channels: tuple[float, ...] = ()  #: Diameters of the channels in which it was fitted, m; none if not stated.
+    friction_coefficient: float | None = None  #: Coefficient of dry friction that was fitted; None: none was.
 
     @property
     def models(self) -> tuple[str, ...]:

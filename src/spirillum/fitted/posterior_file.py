@@ -139,8 +139,7 @@ class PosteriorFile:
     channels: tuple[float, ...]
     body: tuple[float, float]  #: Diameter and length of the fitted body, m.
     draws: Mapping[str, Samples]  #: Parameter to (draws, channels), or (draws, 1).
-    middle: Mapping[str, Samples]
-    """Their medians before thinning, (channels,) or (1,): those of `calibration.toml` too."""
+    middle: Mapping[str, Samples]  #: Their medians before thinning, (channels,) or (1,), as in `calibration.toml`.
     discrepancy: Mapping[str, Samples]  #: Quantity to (draws,).
     error: Mapping[str, Samples]  #: Relative error of a trial, quantity to (draws,).
     friction: tuple[Mapping[str, float], ...]  #: B_eff tail by tail, with `low` and `high`.

@@ -31,8 +31,7 @@ from spirillum.swimming.prediction import predict
 from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import STEADY, swim
 
-Provenance = Literal["text", "digitised", "deposit", "abstract", "second hand", "memory"]
-"""How a published number or statement was read."""
+Provenance = Literal["text", "digitised", "deposit", "abstract", "second hand", "memory"]  #: How it was read.
 
 
 class CaseQuantity(Section):
@@ -153,8 +152,7 @@ def _text(name: str, file: str) -> str:
     return (files("spirillum") / "papers" / name / file).read_text(encoding="utf-8")
 
 
-_ENTRIES = {"drag": (0, 0), "thrust": (0, 3), "torque": (3, 3)}
-"""Entries of the tail's resistance along and about its axis."""
+_ENTRIES = {"drag": (0, 0), "thrust": (0, 3), "torque": (3, 3)}  # of the tail's resistance along and about its axis
 
 
 class CaseValue(NamedTuple):

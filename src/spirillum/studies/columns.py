@@ -156,8 +156,7 @@ def with_band(
 
 POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")  #: Pose and contact of a robot, means over a trial.
 ENDS = ("median", "low", "high")  #: Of an interval over the unknowns.
-TRIAL_STATES = ("no-trial", "swimming", "standing")
-"""State of a robot in its trial; the index in this list is the value in the dataset."""
+TRIAL_STATES = ("no-trial", "swimming", "standing")  #: States of a trial, in the order of the dataset's values.
 _MOST_HELD = 1000  # robots of a study that are computed by `tube` without a request
 
 

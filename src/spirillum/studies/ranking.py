@@ -45,8 +45,7 @@ class QuantityRanking(NamedTuple):
 
 
 STEADY_SPEED = "forward_velocity_settled"  #: The speed in steady motion after release.
-HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"
-"""The speed by `tube` where no model of the study computes walls, and that of a trial."""
+HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"  #: Speeds by `tube` beside other models.
 _BESIDE = (HELD, TRIAL, STEADY_SPEED)  # speeds beside that of a model, where the study has them
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
@@ -100,13 +99,11 @@ class Best(NamedTuple):
     robot: RankedRobot
     places: int  #: Number of poses, the reference pose one of them, at which it is the best; 0 without a band.
     of_places: int  #: Number of poses at which the robots have answers.
-    spread: float
-    """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
+    spread: float  #: Largest less least value of all robots, over the best one's; infinite where no other has a value.
     known: int
     robots: int
     ties: tuple[str, ...] = ()  #: Names of the other robots that have the same value, to rounding.
-    lead: float = np.nan
-    """Of a speed: by how much it leads the next one, over its own value; NaN alone, or where an error is not known."""
+    lead: float = np.nan  #: Of a speed: its lead on the next one, over its own; NaN alone, or without a known error.
     error: float = np.nan  #: Error of the model in that speed, relative.
 
     @property
@@ -132,8 +129,7 @@ class StudyRanking:
     model: str
     friction: str
     walls: bool  #: Whether the walls of a channel that robots are in are left out.
-    held: bool
-    """Whether they are ordered by the speed held at a pose in a tube, in which a released robot swims otherwise."""
+    held: bool  #: Whether they are ordered by the speed held at a pose in a tube, where released robots swim otherwise.
     kind: str  #: What low and high are: `band`, `interval`, or empty where there are none.
     robots: tuple[RankedRobot, ...]  #: Robots that have an answer, the fastest first.
     best: tuple[Best, ...]  #: The best of them by each quantity.

@@ -232,8 +232,7 @@ _FEW, _MORE = 200, 2000  # robots that are computed to estimate the memory of th
 _SOLVING_MEMORY = 5e8  # of a solve of body and walls, bytes; measured for the paper's robot
 
 
-_ROUNDS, _LEAST_TIME = 3, 2.0
-"""Regions of every process behind its first one, and time in s, from which a pace is taken."""
+_ROUNDS, _LEAST_TIME = 3, 2.0  # regions of a process behind its first one, and time, s, from which a pace is taken
 
 
 class Pace:

@@ -47,8 +47,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Levels = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
-"""Levels of the factors in each run, (runs, factors): -1 low, +1 high."""
+Levels = np.ndarray[tuple[int, ...], np.dtype[np.intp]]  #: Levels of factors, (runs, factors): -1 low, +1 high.
 
 
 def half_fraction(factors: int) -> Levels:
@@ -235,8 +234,7 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
 
 SETTLED = (*MOVING, "shaft_power", "hydrodynamic_efficiency")  #: Quantities of a steady motion.
 POSE = ("gap", "pitch", "yaw", "azimuth", "approach_time")  #: Pose of a robot in it, and its time constant.
-SETTLED_STATES = ("not followed", *get_args(State))
-"""Outcome for a robot; the index in this list is the value in the dataset."""
+SETTLED_STATES = ("not followed", *get_args(State))  #: Outcomes for a robot, in the order of the dataset's values.
 
 
 @dataclass(frozen=True)

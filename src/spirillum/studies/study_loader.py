@@ -49,8 +49,7 @@ class LoadedStudy:
     robots: tuple[Robot, ...]  #: One robot a channel of the grid, or the listed robots.
     question: Mapping[str, Any]  #: All that decides the answer, for the fingerprint and the dataset's attributes.
     fit: Fit = NO_FIT  #: Fitted values that act on the robots, or draws over which answers have intervals.
-    placements: tuple[Placement, ...] = ()
-    """Pose of each of `robots` by a calibration; none where the study states it."""
+    placements: tuple[Placement, ...] = ()  #: Pose of each of `robots` by a calibration; none if the study states it.
     model_reason: str = ""  #: Why the model in place of `auto` was taken; empty where all models are named.
 
     def placement_of(self, number: int) -> Placement:

@@ -29,8 +29,7 @@ from spirillum.swimming.steady import STEADY, Swimming, requirements, speed_erro
 
 MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
 """Quantities of every motion."""
-AT_RATES = (*MOVING, "tail_torque", "effective_friction")
-"""Quantities that are also given at observed and at assumed rates."""
+AT_RATES = (*MOVING, "tail_torque", "effective_friction")  #: Quantities also given at observed and at assumed rates.
 WITH_INTERVALS = (
     "forward_velocity",
     "advance_per_radian",
@@ -53,8 +52,7 @@ _TABLED_BLOCK = 64  # of one whose robots have tables; without one a robot takes
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 Marks = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
-QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]
-"""Parts of a batch, their indices in it, and the model of each."""
+QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]  #: Indices of parts of a batch, each with its model.
 
 Part = dict[str, Values]  #: Arrays of one task: (robots, friction models) or (robots, friction models, rates).
 
@@ -115,8 +113,7 @@ class StudyJob(NamedTuple):
     """A task with its inputs, as it is sent to other processes; its robots are numbered from 0."""
 
     task: StudyTask
-    loaded: LoadedStudy
-    """The study without robots, or with those of the task where their posterior draws are requested."""
+    loaded: LoadedStudy  #: The study without robots, or with those of the task where their draws are requested.
     observed: ObservedArrays | None
     number: int = 0  #: Of the task among all of its study.
 

@@ -254,8 +254,7 @@ class ViewArtifacts:
         return light
 
 
-_LAMP_LIGHT = 0.22
-"""Linear light of a lamp in the oil's surface, where white paper has 0.8; a surface of oil mirrors 3 %; assumed."""
+_LAMP_LIGHT = 0.22  # linear light of a lamp in the oil's surface, which mirrors 3 %; white paper has 0.8; assumed
 _LEAST_LAMP, _LARGEST_LAMP = (0.12, 0.20), (0.27, 0.31)  # sides of a lamp over the picture's width and height; assumed
 
 

@@ -36,8 +36,7 @@ class VirtualLens:
     index: float  #: Refractive index of the oil.
     focal: float  #: Focal length, pixels.
     size: tuple[int, int]  #: Width and height of the picture, pixels.
-    leftwards: bool = False
-    """Whether the nose points to the left in the picture: the camera is rotated by half a turn about its axis."""
+    leftwards: bool = False  #: Whether the nose points left: the camera is rotated by half a turn about its axis.
     tilt: tuple[float, float] = (0.0, 0.0)  #: Angle of the optical axis to the vertical about x, then about y, rad.
     distortion: tuple[float, float] = (0.0, 0.0)
     """Coefficients k1, k2 of radial distortion, r -> r (1 + k1 r^2 + k2 r^4), r over the focal length."""

@@ -24,10 +24,8 @@ _SIDEWAYS = float(np.cos(np.radians(75.0)))
 _ENCODED = 2.0  # offset of a normal's components in its encoding as a colour, which is positive
 _EMPTY = -1e30
 _NEAREST, _FARTHEST = 1e-9, 0.9999
-_FAR = np.linspace(_NEAREST, _FARTHEST, 501)
-"""Distances of lines of sight from the centre over the cover's radius, at which paths of light are computed."""
-_SHARP, _BLUR = 2.0, 0.25
-"""Factor by which the floor is shrunk from which on its structure blurs, and how wide over the cover's radius."""
+_FAR = np.linspace(_NEAREST, _FARTHEST, 501)  # distances from the centre over the radius, for paths of light
+_SHARP, _BLUR = 2.0, 0.25  # shrinking from which on the floor's structure blurs, and how wide over the cover's radius
 
 
 class Glass(NamedTuple):

@@ -47,8 +47,7 @@ LARGEST_REYNOLDS = {
 }
 """By channel; captions of Figs 5 and 6."""
 
-GLOBAL_DROP = 0.389
-"""Relative loss of the mean velocity of all tails from the wide to the narrow channel; text on Figs 5 and 6."""
+GLOBAL_DROP = 0.389  #: Relative loss of the mean velocity of all tails in the narrow channel; text on Figs 5 and 6.
 
 LOW_REYNOLDS = 0.1  #: Upper bound of low Reynolds number conditions; text.
 

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from spirillum.fields.flow import Flow
 
-_BESIDE, _STRIP = 1.45, 1.1
-"""Typical room beside a panel for its labels and colour bar; height of the pressure along a tube, inches."""
+_BESIDE, _STRIP = 1.45, 1.1  # room beside a panel for labels and colour bar; height of the pressure in a tube, inches
 _TALLEST = 4.2  # largest height of a panel, inches
 _SPEED_DECADES = 3.0  # largest range of the logarithmic colours: what is slower has the darkest one
 _PRESSURE_DECADES = 2.0  # range of the pressure's logarithmic colours on each side; below it they are linear

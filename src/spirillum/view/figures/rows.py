@@ -25,8 +25,7 @@ _OBSERVED = COLOURS["black"]
 HOLLOW: Any = {"linestyle": "none", "marker": "D", "markersize": 7.5, "markerfacecolor": "none"}
 """Style of an observed mean, transparent for a model's marker behind it."""
 _SHADE = 0.25  # opacity of a band
-_OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
-"""Style of the rotor's own friction, unlike any model's."""
+_OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}  # of the rotor's own friction
 _SETTLED: Any = {
     "linestyle": "none",
     "marker": "*",

@@ -47,8 +47,7 @@ class StudyView:
 
     dataset: xr.Dataset
     whole: xr.Dataset  #: The dataset from which scales are taken, so that all figures of a study share them.
-    paper_figures: Mapping[str, PaperFigure] = field(default_factory=dict)
-    """Figures of a paper by channel, for a study that repeats it."""
+    paper_figures: Mapping[str, PaperFigure] = field(default_factory=dict)  #: By channel, of a repeated paper.
 
     @classmethod
     def of(cls, dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> StudyView:

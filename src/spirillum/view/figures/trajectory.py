@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 COLUMNS = {"single": COLUMN, "double": PAGE}  #: Widths of a figure that fills one or both columns of a page, inches.
-_HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
-"""Heights of the paths, of the cross-section, and of a panel over time, inches."""
+_HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}  # paths, section, panel; inches
 _LETTERS_BESIDE = 40  # letters of a legend, with seven for each line's sample, above which it has two columns
 _MANY_TURNS = 30.0  # turns of the tail above which oscillations fill a panel, and means over a turn are plotted too
 _DECADES = 5  # range of a logarithmic axis

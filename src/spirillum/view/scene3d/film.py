@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
 
 
-_SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
-"""Side of the square over the height of a frame; its left edge over the width; room below it over the height."""
+_SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035  # of the square: side over a frame's height, left over its width, room below
 _FINE = 3  # rendered pixels per displayed pixel, along each side (supersampling)
 _RIM, _ROOM = 0.93, 0.90  # radius of the tube, outside and inside, over half of the square
 _GLASS, _WATER, _BODY = "#5d7486", "#eef3f6", "#c9ced2"
@@ -81,8 +80,7 @@ class CrossSection:
         return [(middle + self._scale * float(y), middle - self._scale * float(z)) for y, z in points]
 
 
-CAMERAS = ("auto", "fixed", "follow")
-"""Motion of the camera; `auto`: it follows a robot that swims further than half of its length."""
+CAMERAS = ("auto", "fixed", "follow")  #: Motion of the camera; `auto`: it follows a robot that swims far enough.
 _ALONG = ("front", "rear")  # views that show the cross-section themselves
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
