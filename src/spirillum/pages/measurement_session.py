@@ -11,6 +11,7 @@ import shutil
 import threading
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from spirillum.calibration.methods import METHODS
 from spirillum.errors import InputError, check_choice
 from spirillum.files import scratch_folder
 from spirillum.pages.job import BackgroundJob
-from spirillum.pages.setup_form import FORM, form_fields, form_list
+from spirillum.pages.setup_form import FORM, form_fields
 from spirillum.pages.video_store import VideoStore, plain, plain_names
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.model_options import CALIBRATED
@@ -342,7 +343,7 @@ class MeasurementSession:
             job = self._progress()
             return {
                 "films": self.films.describe(),
-                "form": form_list(),
+                "form": [asdict(entry) for entry in FORM],
                 "fields": self.editor.fields(),
                 "robots": list(self.editor.robots()),
                 "setup": self.editor.setup_text(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from spirillum.data_tables import rows_of
@@ -41,11 +41,6 @@ FORM = tuple(_entries())  #: Fields of the form, without the robot's file.
 
 _NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
 _KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}
-
-
-def form_list() -> list[dict[str, Any]]:
-    """The form as the page builds it."""
-    return [asdict(entry) for entry in FORM]
 
 
 def form_fields(given: Mapping[str, Any], robots: tuple[str, ...]) -> dict[str, Any]:

@@ -87,7 +87,9 @@ def _column(
     panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, tuple[str, ...]], ticks: int
 ) -> None:
     """One quantity of all robots: points, and lines over their bands."""
-    values, low, high = (_of(robots, which, name) for which in ("values", "low", "high"))
+    values, low, high = (
+        np.array([getattr(robot, which)[name] for robot in robots]) for which in ("values", "low", "high")
+    )
     scale = _scale(np.concatenate([values, high]), unit_of_ranked(name))
     rows = np.arange(len(robots))
     colour = COLOURS["blue"]
@@ -111,10 +113,6 @@ def _scale(values: Values, unit: str) -> UnitPrefix:
         return UnitPrefix(1e-3, "mA") if scale.unit == "A" and largest < 1.0 else scale
     power = int(np.floor(np.log10(largest)))
     return UnitPrefix(10.0**power, f"$10^{{{power}}}$")
-
-
-def _of(robots: tuple[RankedRobot, ...], which: str, name: str) -> Values:
-    return np.array([getattr(robot, which)[name] for robot in robots])
 
 
 _LINE_HEIGHT = 0.34  # height of one model in a panel, inches
