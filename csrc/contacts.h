@@ -102,9 +102,9 @@ typedef struct {
 
 enum { MOST_SLICES = 3 * LANES };
 
-/* Slices of the lubrication film under the body's straight side: h0, m; V and u per rate. */
+/* Slices of the lubrication film under the body's straight side: h0, m, its slope along the body; V and u per rate. */
 typedef struct {
-    double gap[LANES], opening[RATES][LANES], entrainment[RATES][LANES];
+    double gap[LANES], slope[LANES], opening[RATES][LANES], entrainment[RATES][LANES];
 } SliceLanes;
 
 typedef struct {

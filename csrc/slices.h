@@ -9,8 +9,7 @@
 typedef struct {
     SliceLanes ends; /* of the straight side, in the first two lanes */
     Slices slices;
-    double viscosity; /* of the slices, Pa s */
-    bool has_ends, has_slices, is_scaled;
+    bool has_ends, has_slices, is_weakened;
 } SlicedFilm;
 
 /* Body and tube of a film, and the place: `thinnest` is the smallest gap of the body, m. */

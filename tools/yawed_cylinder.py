@@ -90,7 +90,7 @@ def pulls(bound: float, every: int = 8) -> dict[str, NDArray[np.float64]]:
     for k in some:
         offset, yaw = states[:, k]
         rates = rates_at(offset, yaw, bound)
-        cylinder = ShortCylinder(RADIUS, LENGTH, TUBE, offset, 0.0, yaw, (60, 60))
+        cylinder = ShortCylinder(RADIUS, LENGTH, TUBE, offset, 0.0, yaw, (60, 180))
         other.append(-cylinder.solve({2: rates[0], 5: rates[1]}, VISCOSITY, bound)[0][2])
     return {"time": time, "pull": np.array(own), "at": time[list(some)], "reynolds": np.array(other)}
 

@@ -14,10 +14,10 @@ from spirillum.kernels.core import lift_of_cavitation
 
 
 @cache
-def run(pressure: str, wait: str = "60 s") -> xr.Dataset:
-    """Three seconds of the paper's robot in the wide tube after a waiting time."""
-    robot = sp.load("biorob2012-wide", **{"fluid.cavitation_pressure": pressure})
-    return sp.simulate(robot, model="tube", timing={"duration": "3 s"}, in_tube={"wait": wait})
+def run(pressure: str, tube: str = "wide") -> xr.Dataset:
+    """Three seconds of the paper's robot after a minute of waiting."""
+    robot = sp.load(f"biorob2012-{tube}", **{"fluid.cavitation_pressure": pressure})
+    return sp.simulate(robot, model="tube", timing={"duration": "3 s"}, in_tube={"wait": "60 s"})
 
 
 @pytest.mark.parametrize("pressure", ["none", "100 kPa", "10 kPa"])
@@ -78,16 +78,20 @@ def test_the_lift_of_a_run_is_that_of_a_line_contact_that_opens_and_turns() -> N
     np.testing.assert_allclose(found["lift"].values[inner], expected[inner], rtol=0.1, atol=0.02 * expected.max())
 
 
+@pytest.mark.parametrize("tube", ["wide", "narrow"])
 @pytest.mark.parametrize("pressure", ["100 kPa", "10 kPa"])
-def test_the_lift_along_a_run_is_that_of_reynolds_equation_in_two_dimensions(pressure: str) -> None:
-    """The paper's robot, pitched by up to 0.08 degrees on a gap of 0.6 um and less, where a film leaks at its end."""
-    found = run(pressure)
+def test_the_lift_along_a_run_is_that_of_reynolds_equation_in_two_dimensions(pressure: str, tube: str) -> None:
+    """The paper's robot, pitched by up to 0.16 degrees on a gap of 0.6 um, where a film leaks at its end.
+
+    Its body slides along the tube under a gap that opens ahead: without that the lift would be twice as large.
+    """
+    found = run(pressure, tube)
     lifted = np.flatnonzero((found["lift"].values > 0.0) & (found["time"].values > 0.5))
     moments = [found.isel(time=int(k)) for k in lifted[:: max(1, lifted.size // 6)]]
     own = np.array([float(moment["lift"]) for moment in moments])
     other = np.array([run_lift(moment) for moment in moments])
     assert own.sum() == pytest.approx(other.sum(), rel=0.1)
-    assert np.sqrt(np.mean((own - other) ** 2)) < 0.2 * other.mean()
+    assert np.sqrt(np.mean((own - other) ** 2)) < 0.12 * other.mean()
 
 
 def test_a_robot_turned_from_outside_floats_at_the_gap_of_the_closed_problem() -> None:

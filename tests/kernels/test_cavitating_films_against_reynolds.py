@@ -108,6 +108,17 @@ def test_mirror_energy_and_convexity(log_gap: float, v: float, u: float, log_bou
     assert np.linalg.eigvalsh(0.5 * (left + left.T) / scale).max() <= 1e-7
 
 
+@given(st.floats(-1e4, 600.0), st.floats(-6, 6), st.sampled_from([-1.0, 1.0]))
+def test_cavities_leave_a_fifth_of_the_resistance_to_rolling(pull: float, log_a: float, side: float) -> None:
+    """As csrc/slices.c relies on, as long as the linear film pulls with less than 600 p_c."""
+    gap = 1e-6
+    v = pull * ATMOSPHERE * gap**2 / (6.0 * ETA * BEND)
+    found = lift(gap, v, side * 10.0**log_a * ATMOSPHERE * gap**1.5 / (12.0 * ETA * np.sqrt(2.0 * BEND)))
+    of_v, of_u = -linear(gap, 1.0, 0.0)[0], -linear(gap, 0.0, 1.0)[1]
+    left = np.array([[of_v - found[2], -found[4]], [-found[3], 0.8 * of_u - found[5]]])
+    assert np.linalg.eigvalsh(left / np.sqrt(np.outer([of_v, of_u], [of_v, of_u]))).min() >= -1e-7
+
+
 def test_without_a_bound_and_on_approach_nothing_is_added() -> None:
     assert (lift(1e-6, 1e-7, 1e-3, 1e12) == 0.0).all()
     assert (lift(1e-6, 1e-3, 1e-3, np.inf) == 0.0).all()

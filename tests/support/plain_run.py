@@ -1,6 +1,6 @@
 """A run in a tube by a plain integration: an independent solution for tests.
 
-At each pose the film under the body is Reynolds' equation in two dimensions, by finite differences and with its cavity,
+At each pose the film under the body is Reynolds' equation in two dimensions, by finite elements and with its cavity,
 in place of the table's film and the slices of csrc/; asperities, dry friction, weight and motor are written out with
 NumPy, and SciPy steps in time. It takes the outer part of the resistance from the program: the table less its film.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
-from tests.support.reynolds import ShortCylinder
+from tests.support.reynolds import film_at
 
 from spirillum.dynamics.free_robot import drive_of, weight_of
 from spirillum.dynamics.run_file import robot_of
@@ -26,7 +26,7 @@ from spirillum.kernels.tube_table import film_start
 from spirillum.robot.batch import RobotBatch
 
 REFERENCE = 20e-6
-"""Gap, m, at which the table's film and that of the differences are made equal: how a film fades out is a matter of
+"""Gap, m, at which the table's film and that of the elements are made equal: how a film fades out is a matter of
 definition, what it gains as it thins is not."""
 SIDE = slice(0, 2)
 DIFFERENCES = np.array([1e-10, 1e-10, 1e-8, 1e-8, 1e-8, 1e-8, 1e-4, 1e-5])
@@ -64,7 +64,6 @@ class PlainRun:
         self.table: Any = tables_of(batch)[0].packed
         self.radius, self.tube, self.half = 0.5 * body.diameter, 0.5 * robot.channel.diameter, 0.5 * body.length
         self.ball = body.rounding(body.front_end)
-        self.length = 2.0 * self.half - self.ball
         self.eta, self.bound = fluid.viscosity, fluid.cavitation_pressure or np.inf
         self.weight, self.drive = weight_of(robot), drive_of(batch)
         self.channel = robot.channel.length + END_LOSS * self.tube
@@ -108,18 +107,7 @@ class PlainRun:
 
     def _film(self, state: np.ndarray, axes: np.ndarray, rates: np.ndarray, bound: float) -> Film:
         """The film at rates, affine with the cavity as it is found there; in body axes."""
-        middle = -0.5 * self.ball  # of the straight side
-        at = np.array([0.0, *state[SIDE]]) + middle * axes[:, 0]
-        z_loc = np.array([0.0, *(-at[1:] / np.hypot(*at[1:]))])
-        local = np.stack([[1.0, 0.0, 0.0], np.cross(z_loc, [1.0, 0.0, 0.0]), z_loc])
-        turned = local @ axes
-        _, yaw, pitch = np.arcsin(np.clip(turned[:, 0], -1.0, 1.0))
-        to_film = np.zeros((6, 6))
-        to_film[:3, :3] = turned
-        to_film[3, 3], to_film[4:, 4:] = 1.0, turned[1:, 1:]  # the cylinder rolls about its own axis
-        to_film[:3, 3:] = turned @ (middle * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
-        size = (self.radius, self.length, self.tube, float(np.hypot(*at[1:])), float(pitch), float(yaw))
-        cylinder = ShortCylinder(*size, self.cells, self.ball)
+        cylinder, to_film = film_at(self.robot, np.array([0.0, *state[SIDE]]), axes, self.cells)
         matrix, force, self.active, settled = cylinder.affine(to_film @ rates, self.eta, bound, self.active)
         return Film(to_film.T @ matrix @ to_film, to_film.T @ force, settled)
 

@@ -286,15 +286,15 @@ def compare_with_check(
     if outside.any():
         beyond = np.flatnonzero(outside)
         up, aside = (np.degrees(np.abs(angle[beyond]).max()) for angle in (pitch, yaw))
-        notes.append(Note.named("beyond-table", since=_from(time, beyond[0]), pitch=up, yaw=aside))
+        notes.append(Note.named("beyond-table", since=_from(time, int(beyond[0])), pitch=up, yaw=aside))
     elif beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
         reached, known = np.degrees(np.abs(yaw[most])), np.degrees(checked[most])
-        notes.append(Note.named("beyond-checked-yaw", since=_from(time, beyond[0]), yaw=reached, checked=known))
+        notes.append(Note.named("beyond-checked-yaw", since=_from(time, int(beyond[0])), yaw=reached, checked=known))
     least = least_checked_gap(table)
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
-        falls = "its least gap within a turn is" if time is None else f"{_from(time, near[0])}its gap falls to"
+        falls = "its least gap within a turn is" if time is None else f"{_from(time, int(near[0]))}its gap falls to"
         falls = f"{falls} {_length(float(gap[near].min()))}"
         notes.append(Note.named("below-checked-gap", gap=falls, least=_length(least), below=BELOW))
     return Checked(not beyond.size, bool(near.size), notes)
