@@ -76,7 +76,7 @@ def validate_arguments(function: Callable[P, R]) -> Callable[P, R]:
         annotation = signature.parameters[name].annotation
         if not isinstance(annotation, str):
             return (_ANY,)
-        return _kinds(ast.parse(annotation, mode="eval").body, function.__globals__)
+        return _kinds(ast.parse(annotation, mode="eval").body, vars(sys.modules[function.__module__]))
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:

@@ -21,7 +21,7 @@ from spirillum.dynamics.run_file import robot_of
 from spirillum.fluid.tube.library import tables_of
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import core
-from spirillum.kernels.core import film_at, resistance_at
+from spirillum.kernels.core import resistance_at
 from spirillum.kernels.tube_table import film_start
 from spirillum.robot.batch import RobotBatch
 
@@ -93,7 +93,7 @@ class PlainRun:
 
     def _table_film(self, place: tuple[float, float, float, float]) -> np.ndarray:
         film = np.empty((6, 6))
-        film_at(self.table[film_start(self.table) :], *place[:3], film)
+        core.film_at(self.table[film_start(self.table) :], *place[:3], film)
         return film
 
     def _outer(self, place: tuple[float, float, float, float], phase: float) -> np.ndarray:
