@@ -77,17 +77,16 @@ def test_notes_survive_processes_prefixes_and_datasets() -> None:
     assert [found.code for found in notes_in({"warnings": "of an earlier version"})] == ["remark"]
 
 
-def test_the_weightiest_cautions_take_five_rows() -> None:
+def test_the_weightiest_cautions_take_three_rows() -> None:
     notes = [
-        Note("outlier", "m" * 150),
+        Note("outlier", "m" * 60),
         Note("interpolated", "i"),
-        Note("walls-left-out", "w" * 230),
+        Note("walls-left-out", "w" * 150),
         Note("outlier", "n"),
     ]
     assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "outlier"]
-    more = shown_cautions([*notes, Note("pose-unknown", "p" * 150)])
-    assert [note.code for note in more] == ["walls-left-out", "pose-unknown"]
-    video = [Note(code, "v" * 180) for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
+    assert [note.code for note in shown_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
+    video = [Note(code, "v" * 100) for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
     assert [note.code for note in shown_cautions(video)] == ["robot-stands-still"]  # what it shows outweighs the rest
 
 

@@ -135,7 +135,7 @@ def notes_in_answer(answer: Mapping[str, Any]) -> tuple[Note, ...]:
 
 
 def shown_cautions(notes: Iterable[Note]) -> list[Note]:
-    """The weightiest cautions, one of a code, as many as fit into five rows of a terminal."""
+    """The weightiest cautions, one of a code, as many as fit into three rows of a terminal."""
     order = list(KINDS)
     first: dict[str, Note] = {}
     for note in notes:
@@ -145,7 +145,7 @@ def shown_cautions(notes: Iterable[Note]) -> list[Note]:
     rows = 0
     for note in sorted(first.values(), key=lambda note: order.index(note.code)):
         rows += -(-len(f"{note.severity}: {note}") // 80)
-        if shown and rows > 5:
+        if shown and rows > 3:
             break
         shown.append(note)
     return shown
