@@ -197,3 +197,21 @@ def test_motors_that_stutter_make_no_multiples(noise: float) -> None:
     resting = np.where(time < 3.0, readings[0].values[0], readings[0].values)
     found = multiples_of(time, resting, 2 * np.pi, 1.0 / FPS)
     assert found is None or found.repeated < 0.1 * found.steps
+
+
+def test_a_single_misread_frame_widens_intervals_by_one_frame():
+    """Of a faint robot whose tail is not read, one reading of the body alone goes on by a step more, and comes back."""
+    rng = np.random.default_rng(3)
+    time = np.arange(46) / 15.0
+    body = -0.055 * np.arange(46) + 0.004 * rng.normal(size=46)
+    body[21:26] -= [0.06, 0.055, 0.045, 0.03, 0.01]
+    unseen = np.full(46, np.nan)
+    readings = (
+        FrameSeries(unseen, 2 * np.pi, 0.01),
+        FrameSeries(body, np.pi, 0.002),
+        FrameSeries(unseen, np.inf, 5e-6),
+    )
+    found = restored_times(time, readings)
+    assert [(flag.name, flag.spoils) for flag in found.flags] == [("uneven-steps", ())]
+    assert found.relative_error == pytest.approx(1.0 / 45.0)
+    assert found.time is time

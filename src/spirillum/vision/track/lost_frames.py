@@ -130,7 +130,8 @@ def _put_back(
         or stray > max(2.0, LOST_FRAMES.odd_share * lost.sum())
         or not all(_agrees(one, lost) for one in after)
     ):
-        return Restored(time, 0.0, (_uneven(int(np.count_nonzero(lost)) + stray),))
+        flag = _uneven(int(np.count_nonzero(lost)) + stray, single=int(lost.sum()) + stray == 1)
+        return Restored(time, 0.0 if flag.spoils else frame / float(time[-1] - time[0]), (flag,))
     corrected = _later(time, lost, frame)
     # A loss that one series alone shows counts half.
     alone = sum(_sees(one, lost) for one in after) < 2
@@ -363,11 +364,13 @@ def _reverses(moment: float) -> _Change:
     )
 
 
-def _uneven(count: int) -> Flag:
+def _uneven(count: int, *, single: bool) -> Flag:
+    """Flag steps that are no whole frames; a `single` frame changes no rate by more than its share of the video."""
     frames = "1 frame" if count == 1 else f"{count} frames"
+    then = "all intervals are wider for it" if single else "nothing is given"
     sentence = (
         f"on {frames} the motion goes on by more than a step while the times go on evenly, but not clearly by "
         "whole frames: frames were lost, strong compression of the video holds motion back, or the motor stutters; "
-        "nothing is given: record with the camera's own time stamps, and compress less"
+        f"{then}: record with the camera's own time stamps, and compress less"
     )
-    return Flag("uneven-steps", sentence, EVERYTHING)
+    return Flag("uneven-steps", sentence, () if single else EVERYTHING)
