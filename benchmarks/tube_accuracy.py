@@ -26,7 +26,7 @@ from tube_reference import annulus_axial_drag, annulus_axial_drag_no_flux, annul
 
 import spirillum as sp
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.confined import UnitMotions, solve_unit_motions
 from spirillum.fluid.tube.library import tables_of
 from spirillum.fluid.tube.outer_resistance import matrix_of
 from spirillum.fluid.tube.solids import Fineness, Solids
@@ -79,7 +79,7 @@ def body(radius: float, length: float, rear: Any) -> Outline:
 
 
 def held(outline: Outline, radius: float, offset: float, fineness: Fineness) -> Timed:
-    return timed(lambda: held_in_tube(Solids([(outline, 0)], TubePose(radius, offset), fineness), []))
+    return timed(lambda: solve_unit_motions(Solids([(outline, 0)], TubePose(radius, offset), fineness), []))
 
 
 def took(*runs: Timed) -> Row:
@@ -123,7 +123,9 @@ def annulus_rows(*, quick: bool) -> list[Row]:
             runs = [held(body(9.0, length, "hemisphere"), radius, place[2], fineness) for length in lengths]
             short, long = (run.value for run in runs)
 
-            def slope(value: Callable[[Held], float], short: Held = short, long: Held = long) -> float:
+            def slope(
+                value: Callable[[UnitMotions], float], short: UnitMotions = short, long: UnitMotions = long
+            ) -> float:
                 return (value(long) - value(short)) / 20.0
 
             drag, load, loss = slope(lambda h: h.matrix[0, 0]), slope(lambda h: h.load[0]), slope(lambda h: h.drag)
@@ -253,7 +255,9 @@ def wire_rows(*, quick: bool) -> list[Row]:
         for length in lengths:
             x = np.linspace(-0.5 * length, 0.5 * length, 60)
             wire = wire_along(np.stack([x, 0 * x, 0 * x], axis=1), b)
-            lines.append(held_in_tube(Solids([], TubePose(1.0, 0.0), Fineness(tolerance=1e-5)), [(wire, 1)], offset))
+            lines.append(
+                solve_unit_motions(Solids([], TubePose(1.0, 0.0), Fineness(tolerance=1e-5)), [(wire, 1)], offset)
+            )
         found = (lines[1].matrix - lines[0].matrix)[6:, 6:]
         load, loss = lines[1].load[6] - lines[0].load[6], lines[1].drag - lines[0].drag
         no_gradient = (found[0, 0] - load**2 / (8 * np.pi + loss)) / annulus_axial_drag(b, 1.0, offset)

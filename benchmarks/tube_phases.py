@@ -27,7 +27,7 @@ from spirillum.fluid.tube.outer_resistance import (
     factor_of,
     fourier,
     matrices_at,
-    rest_at,
+    outer_coefficients,
     solutions,
 )
 from spirillum.fluid.tube.solids import Fineness
@@ -87,7 +87,7 @@ def main() -> None:
     print(f"pitch {np.degrees(pose.pitch):.2f} deg, yaw {np.degrees(yaw):.2f} deg")
     print("\n".join(["| wavelength, phases | " + " | ".join(RESPONSES) + " |", "| --- |" + " ---: |" * len(RESPONSES)]))
     for (geometry, _), matrices in zip(tails, solved, strict=True):
-        true = rest_at(matrices, film, arguments.t, pose)
+        true = outer_coefficients(matrices, film, arguments.t, pose)
         for count in _COUNTS:
             errors = largest_errors(true, cut_of_film(arguments.t) * film, count)
             words = " | ".join(f"{100.0 * error:.2g}" for error in errors)

@@ -12,7 +12,7 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.data_tables import rows_of
-from spirillum.notes import KINDS, LONGEST, TRACKING, Note, note_attributes, notes_in, shown_cautions
+from spirillum.notes import KINDS, LONGEST, TRACKING, Note, headline_cautions, note_attributes, notes_in
 
 ROOT = Path(__file__).parent.parent
 
@@ -84,12 +84,14 @@ def test_the_weightiest_cautions_take_three_rows() -> None:
         Note("walls-left-out", "w" * 150),
         Note("outlier", "n"),
     ]
-    assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "outlier"]
-    assert [note.code for note in shown_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
+    assert [note.code for note in headline_cautions(notes)] == ["walls-left-out", "outlier"]
+    assert [note.code for note in headline_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
     video = [Note(code, "v" * 100) for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
-    assert [note.code for note in shown_cautions(video)] == ["robot-stands-still"]  # what it shows outweighs the rest
+    assert [note.code for note in headline_cautions(video)] == [
+        "robot-stands-still"
+    ]  # what it shows outweighs the rest
 
 
 def test_a_robot_that_does_not_rest_on_the_floor_says_so_first() -> None:
     light = sp.predict(sp.load("biorob2012-wide", **{"body.mass": "6 g"}), model="tube", motion="held", band=False)
-    assert shown_cautions(light.warnings)[0].code == "robot-floats"
+    assert headline_cautions(light.warnings)[0].code == "robot-floats"

@@ -14,9 +14,9 @@ _load, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from spirillum.version import own_version
+        from spirillum.version import package_version
 
-        return own_version()
+        return package_version()
     if name in RENAMED:
         return __getattr__(current_name(name))
     if name not in __all__:

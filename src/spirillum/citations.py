@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from spirillum.data_tables import rows_of
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_model
-from spirillum.version import own_version
+from spirillum.version import package_version
 
 REFERENCES = {row["key"]: row["reference"] for row in rows_of("references.csv")}  #: Key to full reference.
 
@@ -25,7 +25,7 @@ def citation(result: object = None) -> str:
         InputError: if the object carries no references.
     """
     keys = list(dict.fromkeys(("biorob2012", *_keys_of(result))))
-    return "\n".join([_SOFTWARE.format(version=own_version()), *(REFERENCES[key] for key in keys)])
+    return "\n".join([_SOFTWARE.format(version=package_version()), *(REFERENCES[key] for key in keys)])
 
 
 def _keys_of(result: object) -> Iterable[str]:

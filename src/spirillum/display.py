@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
-from spirillum.notes import Note, notes_in_answer, notes_of, shown_cautions
+from spirillum.notes import Note, headline_cautions, notes_in_answer, notes_of
 from spirillum.quantities import QUANTITIES
 from spirillum.units import among, in_unit, speed_unit
 
@@ -85,13 +85,13 @@ class DisplayMixin(ABC):
         """What is assumed or violated, what that does to the answer and what to do, each with a code."""
         return notes_of(getattr(self, "warnings", ()))
 
-    def _shown(self) -> tuple[Mapping[str, Any], Iterable[str] | None]:
+    def _display_content(self) -> tuple[Mapping[str, Any], Iterable[str] | None]:
         """The answer as data, and the names of the quantities to show; None: all."""
         return self.to_dict(), None
 
     def __repr__(self) -> str:
         """The answer in a line: whose it is, by which model, and its first quantity."""
-        answer, only = self._shown()
+        answer, only = self._display_content()
         words = [str(answer[name]) for name in ("robot", "model") if isinstance(answer.get(name), str)]
         for name in answer if only is None else only:
             if rows := rows_of(answer, [name]):
@@ -102,18 +102,18 @@ class DisplayMixin(ABC):
 
     def __str__(self) -> str:
         """The answer as text, for `print`."""
-        return text_of(*self._shown())
+        return text_of(*self._display_content())
 
     def _repr_html_(self) -> str:
         """The answer as a table, for notebooks."""
-        return html_of(*self._shown())
+        return html_of(*self._display_content())
 
 
 def text_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
     """An answer as text: its title, the weightiest cautions, a line for each quantity, the number of its notes."""
     rows = rows_of(answer, only)
     notes = notes_in_answer(answer)
-    cautions = shown_cautions(notes)
+    cautions = headline_cautions(notes)
     lines = [_title(answer), *(f"caution: {note}" for note in cautions), *_lines(rows, "  ")]
     if len(rows) < (whole := len(rows_of(answer))):
         lines.append(f"  and {whole - len(rows)} more: dir(answer), answer.to_dict()")

@@ -134,7 +134,7 @@ def notes_in_answer(answer: Mapping[str, Any]) -> tuple[Note, ...]:
     return tuple(Note(item["code"], item["sentence"], item["fields"]) for item in answer.get("notes", ()))
 
 
-def shown_cautions(notes: Iterable[Note]) -> list[Note]:
+def headline_cautions(notes: Iterable[Note]) -> list[Note]:
     """The weightiest cautions, one of a code, as many as fit into three rows of a terminal."""
     order = list(KINDS)
     first: dict[str, Note] = {}

@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 
 @lru_cache(maxsize=1)
-def own_version() -> str:
+def package_version() -> str:
     """Version of the program."""
     return version("spirillum")
 

@@ -29,7 +29,7 @@ from typing import Any, Generic, TypeVar
 
 from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
-from spirillum.version import own_version, versions
+from spirillum.version import package_version, versions
 
 AHEAD = 3  #: Tasks that wait or are answered for each process: what is sent ahead or not yet taken stays in memory.
 
@@ -232,7 +232,7 @@ def _client(address: str) -> Any:
 
 
 def _about() -> tuple[str, str]:
-    return own_version(), versions()
+    return package_version(), versions()
 
 
 def _workers(client: Any, address: str) -> list[str]:

@@ -66,13 +66,13 @@ def test_few_tails_widen_the_intervals_as_students_distribution_does(
 
 
 def test_the_spread_of_a_discrepancy_follows_its_degrees_of_freedom() -> None:
-    from spirillum.calibration.least_squares import _drawn_discrepancy
+    from spirillum.calibration.least_squares import _sampled_discrepancy
 
     rng = np.random.default_rng(1)
     # Far below the prior's scale, total/tau^2 is chi-squared (density of tau flat: one degree of freedom fewer).
-    draws = _drawn_discrepancy(1e-2 * 31, 0.0, 31.0, 200_000, rng)
+    draws = _sampled_discrepancy(1e-2 * 31, 0.0, 31.0, 200_000, rng)
     assert np.mean(1e-2 * 31 / draws**2) == pytest.approx(30.0, rel=0.05)
-    unseen = _drawn_discrepancy(0.0, 0.0, 0.0, 200_000, rng)
+    unseen = _sampled_discrepancy(0.0, 0.0, 0.0, 200_000, rng)
     assert np.median(unseen) == pytest.approx(0.3 * 0.6745, rel=0.02)
 
 

@@ -13,7 +13,7 @@ from spirillum.calibration.problem import posed
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
-from spirillum.swimming.drawn_resistance import AxialTable, chebyshev_points
+from spirillum.swimming.sampled_resistance import AxialTable, chebyshev_points
 
 VISCOSITY = np.array([3.5])
 PRESETS = ["biorob2012-wide", "biorob2012-narrow"]

@@ -13,7 +13,7 @@ import spirillum as sp
 from spirillum.fitted.posterior_file import PosteriorFile, posterior_checksum
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
-from spirillum.swimming.drawn_resistance import sampled_discrepancy
+from spirillum.swimming.sampled_resistance import sampled_discrepancy
 from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"
@@ -222,7 +222,7 @@ def test_each_draw_is_run_with_its_own_numbers(fitted: Any) -> None:
 
     posterior = read_posterior(fitted[1] / "posterior.nc")
     robot = posterior.central(load(WIDE))
-    drawn = posterior.drawn(robot, 5, np.random.default_rng(1))
+    drawn = posterior.sampled_robots(robot, 5, np.random.default_rng(1))
     values = posterior.of(robot, np.random.default_rng(1))
     for one, place in zip(drawn, posterior.places(5), strict=True):
         assert one.calibration["sbt"].body_drag == values["body_drag"][place]

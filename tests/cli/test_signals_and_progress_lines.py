@@ -14,7 +14,7 @@ import pytest
 
 from spirillum.cli import renderer
 from spirillum.cli.progress import ProgressLines
-from spirillum.fluid.tube.progress_messages import kept_after
+from spirillum.fluid.tube.progress_messages import saved_state_message
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 
@@ -94,7 +94,7 @@ def test_signal_ends_work_of_one_process_too(tmp_path: Path) -> None:
 
 
 def test_what_is_kept_is_counted() -> None:
-    assert kept_after(60, 12) == "12 of 60 poses are saved; the same command resumes the computation"
+    assert saved_state_message(60, 12) == "12 of 60 poses are saved; the same command resumes the computation"
 
 
 class _Clock:

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 import posteriors
 import spirillum as sp
 from spirillum.designs.criteria import Manufacturability, condition_of, quantity_of, space_of
-from spirillum.designs.design_result import Learned, lead_warnings
+from spirillum.designs.design_result import Learned, margin_warnings
 from spirillum.designs.evaluation import Evaluation, Objective, Unknowns
 from spirillum.designs.search import Archive, best_design
 from spirillum.errors import InputError
@@ -233,10 +233,10 @@ def test_a_lead_within_the_error_of_a_learned_model_is_no_lead(unsure: sp.Design
     close = {"objective": 0.99 * unsure.objective, "keeps": True}
     one_per_cent = tuple(replace(item, **close) for item in unsure.alternatives)
     learned = replace(unsure, model="tube", learned=Learned(20, 1e-3, 2e-2), alternatives=one_per_cent)
-    (sentence,) = lead_warnings(learned)
+    (sentence,) = margin_warnings(learned)
     assert "the runner-up by 1 %, within the error of 2 % of the learned" in sentence
     breaking = tuple(replace(item, keeps=False) for item in one_per_cent)
-    assert lead_warnings(replace(learned, alternatives=breaking)) == ()
+    assert margin_warnings(replace(learned, alternatives=breaking)) == ()
 
 
 def test_a_better_design_outside_the_ranges_is_said_to_be_one() -> None:
@@ -251,7 +251,7 @@ def test_a_better_design_outside_the_ranges_is_said_to_be_one() -> None:
 
 def test_a_field_that_changes_nothing_is_named() -> None:
     found = sp.design("biorob2012-wide", {"body.mass": "8 g:12 g"}, maximise="forward_velocity", model="sbt")
-    (said,) = lead_warnings(found)
+    (said,) = margin_warnings(found)
     assert said == "the forward velocity does not depend on body.mass: every value of the range is as good"
 
 

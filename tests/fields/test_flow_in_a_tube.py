@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.fields.flow import seat_in_tube
+from spirillum.fields.flow import find_tube_pose
 from spirillum.fields.grid import box_around, plane_around
 
 WIDE, R = "biorob2012-wide", 0.02
@@ -66,7 +66,7 @@ def test_held_force_is_across_the_tube(swimming: sp.Flow) -> None:
 @pytest.mark.parametrize(("plane", "middle"), [("xz", 0.0), ("xy", 6.0)])
 def test_planes_beside_the_tube_are_refused(robot: sp.Robot, plane: str, middle: float) -> None:
     """The body, of radius 9 mm, 5 mm above the floor of a tube of 20 mm: its axis is 6 mm below that of the tube."""
-    seat = seat_in_tube(robot, "tube", {"gap": "5 mm"}, None)
+    seat = find_tube_pose(robot, "tube", {"gap": "5 mm"}, None)
     for side in (-1.0, 1.0):
         plane_around(robot, plane, f"{middle + side * 19.99} mm", resolution=8, seat=seat)
         beyond = f"{middle + side * 20.01:g} mm"
@@ -106,7 +106,7 @@ def test_the_body_frame_lacks_the_velocity_along_the_tube(swimming: sp.Flow) -> 
 
 def test_boxes_show_a_tube_whole_unless_it_is_wide_or_an_extent_is_given() -> None:
     robot = sp.load(WIDE)
-    seat = seat_in_tube(robot, "tube", {"gap": "1 mm"})
+    seat = find_tube_pose(robot, "tube", {"gap": "1 mm"})
     assert seat is not None
     whole = plane_around(robot, "yz", seat=seat).axes
     assert whole[1][-1] == pytest.approx(1.05 * R, rel=0.02)
@@ -115,10 +115,10 @@ def test_boxes_show_a_tube_whole_unless_it_is_wide_or_an_extent_is_given() -> No
     assert closer[2][0] == pytest.approx(0.01 - 1.05 * R, abs=1e-3)
     assert closer[2][-1] == pytest.approx(0.012, abs=1e-3)
     broad = sp.load(WIDE, **{"channel.diameter": "300 mm"})
-    axes = plane_around(broad, "yz", seat=seat_in_tube(broad, "tube", {"gap": "1 mm"})).axes
+    axes = plane_around(broad, "yz", seat=find_tube_pose(broad, "tube", {"gap": "1 mm"})).axes
     assert axes[2][-1] == pytest.approx(0.009 + 1.2 * 0.018, abs=3e-4)
     assert axes[2][0] == pytest.approx(-0.01 - 0.05 * 0.15, abs=3e-4)
-    assert seat_in_tube(robot, "slender") is None
+    assert find_tube_pose(robot, "slender") is None
 
 
 @pytest.mark.parametrize(

@@ -153,15 +153,15 @@ def test_compressed_parts_of_a_study_are_not_inflated(tmp_path: Path) -> None:
     with zipfile.ZipFile(parts / "part-00000.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("outside.npy", b"\0" * (64 << 20))
     assert (parts / "part-00000.npz").stat().st_size < 1 << 20
-    from spirillum.studies.run import kept
+    from spirillum.studies.run import stored_answer
     from spirillum.studies.study_loader import load_study
     from spirillum.studies.work import tasks
 
     task = next(iter(tasks(load_study(study))))
-    assert kept(0, task, parts, 4) is None
+    assert stored_answer(0, task, parts, 4) is None
     os.remove(parts / "part-00000.npz")  # noqa: PTH107
     os.mkfifo(parts / "part-00000.npz")
-    assert kept(0, task, parts, 4) is None
+    assert stored_answer(0, task, parts, 4) is None
 
 
 @pytest.mark.parametrize("content", [b"[" * 100_000, b"", b"\xff", b"null", b'{"fingerprint": ' + b"1" * 5000 + b"}"])
@@ -188,11 +188,11 @@ def test_a_pipe_in_the_cache_costs_time_only(tmp_path: Path, monkeypatch: pytest
     answer = np.ones((13, 13))
     compute = lambda _question: answer  # noqa: E731
     compute.__module__ = "spirillum.fluid.tube.solids"
-    assert np.array_equal(cache.kept_or_computed(question, compute), answer)
+    assert np.array_equal(cache.cached_or_computed(question, compute), answer)
     (kept,) = (tmp_path / "tube").glob("*.f64")
     kept.unlink()
     os.mkfifo(kept)
-    assert np.array_equal(soon(lambda: cache.kept_or_computed(question, compute)), answer)  # type: ignore[arg-type]
+    assert np.array_equal(soon(lambda: cache.cached_or_computed(question, compute)), answer)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

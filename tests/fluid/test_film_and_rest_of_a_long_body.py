@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.support.long_cylinders import beside_a_plane, rotation_in_a_tube
 
-from spirillum.fluid.tube.confined import held_in_tube
+from spirillum.fluid.tube.confined import solve_unit_motions
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.robot.outline import body_outline
@@ -33,7 +33,9 @@ def film(tube: float, gap: float) -> np.ndarray:
 
 def rest(tube: float, gap: float, tolerance: float) -> np.ndarray:
     pose = TubePose(tube, tube - A - gap, 0.0)
-    whole = per_length(lambda body: held_in_tube(Solids([(body, 0)], pose, Fineness(tolerance=tolerance)), []).matrix)
+    whole = per_length(
+        lambda body: solve_unit_motions(Solids([(body, 0)], pose, Fineness(tolerance=tolerance)), []).matrix
+    )
     return whole - film(tube, gap)
 
 

@@ -157,7 +157,7 @@ def test_the_finest_stage_that_there_is_answers(
     robot = solved_by.geometry, solved_by.radius
     assert find_table(*robot) is None
     for stage in STAGES.values():
-        library._put(made(solved_by, stage))
+        library._save(made(solved_by, stage))
         found = find_table(*robot)
         assert found is not None
         assert found.stage == stage.name

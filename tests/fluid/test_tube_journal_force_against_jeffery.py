@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.support.long_cylinders import rotation_in_a_tube
 
-from spirillum.fluid.tube.confined import held_in_tube
+from spirillum.fluid.tube.confined import solve_unit_motions
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.robot.outline import body_outline
 from spirillum.robot.tube_pose import TubePose
@@ -20,7 +20,9 @@ def test_force_and_torque_per_length_of_the_papers_body() -> None:
 
     def matrix(length: float) -> np.ndarray:
         outline = body_outline("capsule", 2 * a, length, 0.0, "hemisphere", "hemisphere")
-        return held_in_tube(Solids([(outline, 0)], TubePose(R, R - a - gap, 0.0), Fineness(tolerance=1e-3)), []).matrix
+        return solve_unit_motions(
+            Solids([(outline, 0)], TubePose(R, R - a - gap, 0.0), Fineness(tolerance=1e-3)), []
+        ).matrix
 
     short, long = 75.0, 95.0
     slope = (matrix(long) - matrix(short)) / (long - short)

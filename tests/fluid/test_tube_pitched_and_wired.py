@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spirillum.fluid.algebra import axis_rotation
-from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.confined import UnitMotions, solve_unit_motions
 from spirillum.fluid.tube.reduced import Reduced, _unbounded
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.wall import point_reflection, waves_between
@@ -49,13 +49,13 @@ def near(wire: Wire) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def swimmer(pitch: float, accuracy: Literal["standard", "high"]) -> Held:
+def swimmer(pitch: float, accuracy: Literal["standard", "high"]) -> UnitMotions:
     wire = coil()
     solids = Solids([(ball(0.0, 0.4), 0)], TubePose(1.0, 0.1, pitch), Fineness(accuracy, tolerance=1e-4), near(wire))
-    return held_in_tube(solids, [(wire, 1)])
+    return solve_unit_motions(solids, [(wire, 1)])
 
 
-def thirteen(found: Held, size: int = 12) -> np.ndarray:
+def thirteen(found: UnitMotions, size: int = 12) -> np.ndarray:
     """R, load and drag over the roots of the diagonal."""
     whole = np.empty((size + 1, size + 1))
     whole[:size, :size], whole[size, size] = found.matrix[:size, :size], found.drag
@@ -77,7 +77,7 @@ def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
     """Rings about a pitched axis, other waves and other modes: in the tube's axes the same matrix and load."""
     fineness = Fineness(tolerance=1e-4, order=8)
     level, pitched = (
-        held_in_tube(Solids([(ball(0.0, 0.4), 0)], TubePose(1.0, 0.4, p), fineness), []) for p in (0.0, pitch)
+        solve_unit_motions(Solids([(ball(0.0, 0.4), 0)], TubePose(1.0, 0.4, p), fineness), []) for p in (0.0, pitch)
     )
     turn = in_tube_axes(pitch)
     matrix = turn @ pitched.matrix[:6, :6] @ turn.T
@@ -104,7 +104,7 @@ def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
 def test_a_capsule_that_is_hardly_pitched_is_level(offset: float, tolerance: float, allowed: float) -> None:
     """On rings that meet every wave by themselves, however coarsely waves are cut; also over a thin film."""
     level, hardly = (
-        held_in_tube(Solids([(capsule(), 0)], TubePose(1.0, offset, pitch), Fineness(tolerance=tolerance)), [])
+        solve_unit_motions(Solids([(capsule(), 0)], TubePose(1.0, offset, pitch), Fineness(tolerance=tolerance)), [])
         for pitch in (0.0, 1e-9)
     )
     np.testing.assert_allclose(thirteen(hardly, 6), thirteen(level, 6), atol=allowed)
@@ -115,7 +115,7 @@ def test_a_pitched_capsule() -> None:
     """Symmetric, positive, even in the pitch on the axis."""
     fineness = Fineness(tolerance=1e-3)
     up, down = (
-        held_in_tube(Solids([(capsule(), 0)], TubePose(1.0, 0.0, pitch), fineness), []) for pitch in (0.12, -0.12)
+        solve_unit_motions(Solids([(capsule(), 0)], TubePose(1.0, 0.0, pitch), fineness), []) for pitch in (0.12, -0.12)
     )
     assert np.linalg.eigvalsh(thirteen(up, 6))[0] > 0.002
     assert up.asymmetry < 2e-4
@@ -124,7 +124,7 @@ def test_a_pitched_capsule() -> None:
     assert abs(thirteen(up, 6)[0, 2]) > 0.01  # what moves along its pitched axis drifts
 
 
-def velocities(found: Held, targets: np.ndarray, pose: TubePose, blob2: np.ndarray) -> np.ndarray:
+def velocities(found: UnitMotions, targets: np.ndarray, pose: TubePose, blob2: np.ndarray) -> np.ndarray:
     """Of everything in the tube, summed as point forces: modes become tractions on rings, the wall reflects them.
 
     Stations of wires, squares of blob radii `blob2`, feel others as those feel them; other targets have 0.
@@ -228,7 +228,7 @@ def test_in_a_wide_tube_nothing_is_confined(accuracy: Literal["standard", "high"
     scale = np.sqrt(np.outer(np.diag(free), np.diag(free)))
     errors = []
     for radius in (50.0, 200.0):
-        found = held_in_tube(
+        found = solve_unit_motions(
             Solids([(solid, 0)], TubePose(radius, 0.0), Fineness(accuracy, tolerance=1e-6), near(wire)), [(wire, 1)]
         )
         errors.append(np.max(np.abs(found.matrix - free) / scale))
@@ -236,10 +236,12 @@ def test_in_a_wide_tube_nothing_is_confined(accuracy: Literal["standard", "high"
     np.testing.assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
 
 
-def slopes(radius: float, offset: float, shorter: float = 4.0, tolerance: float = 1e-5) -> tuple[Held, Held]:
+def slopes(
+    radius: float, offset: float, shorter: float = 4.0, tolerance: float = 1e-5
+) -> tuple[UnitMotions, UnitMotions]:
     """Straight wires, one longer by 1, at an offset below the axis of a tube of radius 1, far from a ball."""
     short, long = (
-        held_in_tube(
+        solve_unit_motions(
             Solids([(ball(-3.0 - 0.5 * length, 0.3), 0)], TubePose(1.0, 0.0), Fineness(tolerance=tolerance)),
             [(straight(0.0, length, radius), 1)],
             offset,
@@ -249,7 +251,7 @@ def slopes(radius: float, offset: float, shorter: float = 4.0, tolerance: float 
     return short, long
 
 
-def no_gradient(short: Held, long: Held) -> float:
+def no_gradient(short: UnitMotions, long: UnitMotions) -> float:
     """Axial drag per length at no pressure gradient."""
     drag, load = long.matrix[6, 6] - short.matrix[6, 6], long.load[6] - short.load[6]
     found: float = drag - load**2 / (8 * np.pi + long.drag - short.drag)
@@ -295,7 +297,7 @@ def test_a_wire_near_the_glass_against_a_cylinder_resolved() -> None:
     short, long = slopes(b, offset)
     bodies = [body_outline("capsule", 2 * b, length, 0.0, "hemisphere", "hemisphere") for length in (2.0, 3.0)]
     fineness = Fineness(tolerance=1e-2)
-    solid = [held_in_tube(Solids([(body, 0)], TubePose(1.0, offset), fineness), []).matrix for body in bodies]
+    solid = [solve_unit_motions(Solids([(body, 0)], TubePose(1.0, offset), fineness), []).matrix for body in bodies]
     for i, error in ((0, 0.04), (1, 0.07), (2, 0.15)):
         wanted = solid[1][i, i] - solid[0][i, i]
         np.testing.assert_allclose(long.matrix[6 + i, 6 + i] - short.matrix[6 + i, 6 + i], wanted, rtol=error)
@@ -307,13 +309,13 @@ def test_a_lowered_tail_turns_about_its_own_axis() -> None:
     drop = np.array([0.0, 0.0, -0.3])
     lowered = Wire(wire.points + drop, wire.tangents, wire.lengths, wire.radius)
     solids = Solids([(solid, 0)], TubePose(1.0, 0.2), Fineness(tolerance=1e-4), near(wire))
-    dropped, built = held_in_tube(solids, [(wire, 1)], 0.3), held_in_tube(solids, [(lowered, 1)])
+    dropped, built = solve_unit_motions(solids, [(wire, 1)], 0.3), solve_unit_motions(solids, [(lowered, 1)])
     shift = np.eye(12)
     shift[6:9, 9:] = [[0, -drop[2], drop[1]], [drop[2], 0, -drop[0]], [-drop[1], drop[0], 0]]
     wanted = shift.T @ built.matrix @ shift
     scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
     np.testing.assert_allclose(dropped.matrix / scale, wanted / scale, atol=1e-6)
-    level = held_in_tube(solids, [(wire, 1)])
+    level = solve_unit_motions(solids, [(wire, 1)])
     assert dropped.matrix[8, 8] > 1.1 * level.matrix[8, 8]  # nearer to the wall
 
 
@@ -336,7 +338,7 @@ def test_reduced_basis_against_all_fields(pose: TubePose, accuracy: Literal["sta
     """What a coil sends to a body that it nearly touches, at a phase that is not in the basis: field by field."""
     solids = Solids([(ball(0.0, 0.4), 0)], pose, Fineness(accuracy, tolerance=1e-4), near(coil()))
     wire = turned(coil(), 1.0)
-    found = held_in_tube(solids, [(wire, 1)])
+    found = solve_unit_motions(solids, [(wire, 1)])
     inner = Wire(
         wire.points[:, [0, 2, 1]] * [1, 1, -1], wire.tangents[:, [0, 2, 1]] * [1, 1, -1], wire.lengths, wire.radius
     )
@@ -373,7 +375,7 @@ def test_a_wire_alone_against_a_dense_matrix() -> None:
     wire = straight(-1.3, 1.2, 0.02)
     drag = []
     for solids in ([], [(ball(4.0, 0.4), 0)]):
-        found = held_in_tube(Solids(solids, TubePose(1.0, 0.0), Fineness(tolerance=1e-8)), [(wire, 1)])
+        found = solve_unit_motions(Solids(solids, TubePose(1.0, 0.0), Fineness(tolerance=1e-8)), [(wire, 1)])
         drag.append(found.matrix[6:9, 6:9])
     waves = waves_between(1.0, float(np.ptp(wire.points[:, 0])), 1.0, 1e-8)
     count = len(wire.points)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.confined import UnitMotions, solve_unit_motions
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.outline import Outline, body_outline
@@ -33,13 +33,13 @@ def capsule(length: float, rear: Any = "hemisphere") -> Outline:
 
 
 @lru_cache(maxsize=64)
-def held(outline: Outline, radius: float, gap: float | None, fineness: Fineness, size: float = 9.0) -> Held:
+def held(outline: Outline, radius: float, gap: float | None, fineness: Fineness, size: float = 9.0) -> UnitMotions:
     """A body of radius `size` at a gap from the floor; None: on the axis."""
     offset = 0.0 if gap is None else radius - size - gap
-    return held_in_tube(Solids([(outline, 0)], TubePose(radius, offset), fineness), [])
+    return solve_unit_motions(Solids([(outline, 0)], TubePose(radius, offset), fineness), [])
 
 
-def thirteen(found: Held) -> np.ndarray:
+def thirteen(found: UnitMotions) -> np.ndarray:
     """R, load and drag of a body alone, (7, 7), over the roots of its diagonal."""
     whole = np.empty((7, 7))
     whole[:6, :6], whole[6, 6] = found.matrix[:6, :6], found.drag
@@ -133,7 +133,7 @@ def test_the_eccentric_annulus(
     short, long = (held(capsule(size), radius, gap, Fineness(tolerance=tolerance)) for size in (length - 15.0, length))
     place = 9.0, radius, radius - 9.0 - gap
 
-    def slope(value: Callable[[Held], float]) -> float:
+    def slope(value: Callable[[UnitMotions], float]) -> float:
         return (value(long) - value(short)) / 15.0
 
     drag, load, loss = slope(lambda h: h.matrix[0, 0]), slope(lambda h: h.load[0]), slope(lambda h: h.drag)

@@ -22,15 +22,15 @@ from spirillum.fluid.tube.outer_resistance import (
     HARMONICS,
     PHASES,
     NodeSolution,
-    all_kept,
+    all_cached,
     even_phases,
     factor_of,
     fourier,
     matrices_at,
     matrix_of,
+    mirror_image,
     mirrored,
-    rest_at,
-    seen_in_mirror,
+    outer_coefficients,
     solutions,
 )
 from spirillum.fluid.tube.solids import Fineness
@@ -282,7 +282,7 @@ def test_a_node_gives_its_matrix_back_at_every_phase() -> None:
         return matrix
 
     for count, enough in ((5, False), (7, True), (PHASES, True)):
-        found = rest_at(np.stack([full(phase) for phase in even_phases(count)]), film, 0.3, pose)
+        found = outer_coefficients(np.stack([full(phase) for phase in even_phases(count)]), film, 0.3, pose)
         assert found.shape == (PHASES, kernel.PARAMETERS)
         back = matrices_at(found, np.array([1.234]))[0]
         back[:6, :6] += core.cut_of_film(0.3) * film
@@ -316,7 +316,7 @@ def test_the_mirror_image_of_a_mirror_image_is_the_robot(geometry: RobotGeometry
     assert back == geometry
     assert again == pytest.approx((0.3, 2.0))
     a = np.random.default_rng(5).normal(size=(8, 8))
-    np.testing.assert_array_equal(seen_in_mirror(seen_in_mirror(a)), a)
+    np.testing.assert_array_equal(mirror_image(mirror_image(a)), a)
     # seen in the mirror, points of the wire are those of the image
     one, other = geometry.wire().points, image.wire().points
     np.testing.assert_allclose(one * [1, -1, 1], other @ rotation(np.pi).T, atol=1e-12)
@@ -408,7 +408,7 @@ def test_the_mirror_image_of_a_table_is_the_mirror_image_of_its_answers(places: 
     image = kernel.mirror_image(table)
     for e, pitch, yaw, phase in ((0.009, 0.02, 0.05, 0.3), (0.004, -0.04, -0.1, 2.0), (0.0, 0.01, 0.0, 5.0)):
         found = at(image, e, pitch, yaw, phase)[0]
-        own = seen_in_mirror(at(table, e, pitch, -yaw, np.pi - phase)[0])
+        own = mirror_image(at(table, e, pitch, -yaw, np.pi - phase)[0])
         scale = np.sqrt(np.diag(found))
         np.testing.assert_allclose(found / np.outer(scale, scale), own / np.outer(scale, scale), atol=1e-9)
     again = kernel.parts_of(kernel.mirror_image(image))
@@ -456,13 +456,13 @@ def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
     coarse = Fineness("standard", 0.05, order=4)
     tail = geometry._replace(coupling_diameter=0.0, tail_length=0.02, wavelength=0.02)
     one, more = (NodeSolution(((tail, phases),), TubePose(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
-    assert not all_kept([one])
+    assert not all_cached([one])
     tube._answer.cache_clear()
     solutions([one], "a place", workers=1)
-    assert all_kept([one])
-    assert not all_kept([one, more])
+    assert all_cached([one])
+    assert not all_cached([one, more])
     monkeypatch.setenv("SPIRILLUM_CACHE", "off")
-    assert not all_kept([one])
+    assert not all_cached([one])
 
 
 _UNGUARDED = """

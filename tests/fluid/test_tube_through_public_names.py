@@ -16,7 +16,7 @@ import spirillum as sp
 from spirillum.fluid.algebra import joint_locked
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.cache import cache_folder
-from spirillum.fluid.tube.tube import END_LOSS, held_robot
+from spirillum.fluid.tube.tube import END_LOSS, unit_motions
 from spirillum.robot.placement import Placement
 
 MODEL: Any = find_swimmer_model("tube")
@@ -64,7 +64,7 @@ def refused(call: Callable[[], Any]) -> str:
 
 def test_ends_are_one_scalar(batch: Any) -> None:
     """Open: load load'/(8 pi mu (L + 1.09 R) + drag) less than closed; no length at all is no pressure drop."""
-    held = held_robot(batch)
+    held = unit_motions(batch)
     mu, length, radius = (
         float(batch.viscosity[0]),
         float(batch.channel_length[0]),
@@ -91,7 +91,7 @@ def test_an_imposed_flow_is_closed_and_a_load(batch: Any) -> None:
     """The same matrix, the wrench of that flow on the robot at rest, and the mean flow that was asked for."""
     flowing, closed = placed(batch, flow="2 mm/s"), placed(batch, ends="closed")
     np.testing.assert_array_equal(MODEL.axial(flowing), MODEL.axial(closed))
-    held = held_robot(batch)
+    held = unit_motions(batch)
     wanted = 2e-3 * float(batch.viscosity[0]) * held.load[[0, 3, 6, 9]]
     np.testing.assert_allclose(MODEL.axial_load(flowing)[0], wanted, rtol=1e-12)
     np.testing.assert_array_equal(MODEL.mean_flow(flowing), [[0, 0, 0, 0, 2e-3]])
@@ -103,7 +103,7 @@ def test_an_imposed_flow_is_closed_and_a_load(batch: Any) -> None:
 def test_plug(batch: Any, robot: Any) -> None:
     """The mean flow of the open tube balances: what robot and ends resist is what the robot's motion drives."""
     answer = predicted(robot)
-    held = held_robot(batch)
+    held = unit_motions(batch)
     rates = np.array(
         [answer.forward_velocity, answer.body_rotation_rate, answer.forward_velocity, answer.tail_rotation_rate]
     )
@@ -251,7 +251,7 @@ import numpy as np, spirillum as sp
 import spirillum.fluid.tube.tube as tube
 def refuse(*arguments):
     raise AssertionError("computed anew")
-tube.held_in_tube = refuse
+tube.solve_unit_motions = refuse
 robot = sp.load("biorob2012-wide")
 asked = {"placement": {"gap": "4 mm", "ends": "closed"}, "resolution": {"tolerance": 0.04}}
 answer = sp.resistance(robot, model="tube", part="body", **asked)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spirillum.fluid.algebra import axis_rotation
-from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.confined import UnitMotions, solve_unit_motions
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.wire.stokeslets import Wire, wire_along
 from spirillum.robot.outline import Arc, Outline, body_outline
@@ -37,7 +37,7 @@ def solids(body: str, pose: TubePose, fineness: Fineness) -> Solids:
     return Solids([(BODIES[body], 0)], pose, fineness, near)
 
 
-def thirteen(found: Held) -> np.ndarray:
+def thirteen(found: UnitMotions) -> np.ndarray:
     whole = np.empty((13, 13))
     whole[:12, :12], whole[12, 12] = found.matrix, found.drag
     whole[:12, 12] = whole[12, :12] = found.load
@@ -47,7 +47,7 @@ def thirteen(found: Held) -> np.ndarray:
 @lru_cache(maxsize=16)
 def robot(body: str, pose: TubePose, phase: float = 0.7, hand: float = 1.0, fineness: Fineness = COARSE) -> np.ndarray:
     """R, load and drag in body axes."""
-    return thirteen(held_in_tube(solids(body, pose, fineness), [(coil(phase, hand), 1)]))
+    return thirteen(solve_unit_motions(solids(body, pose, fineness), [(coil(phase, hand), 1)]))
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> float:
@@ -97,7 +97,9 @@ def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
 @pytest.mark.parametrize("body", [pytest.param("ball", marks=pytest.mark.slow), "capsule"])
 def test_reciprocal_and_positive(body: str) -> None:
     """Edges limit reciprocity to the order of the quadrature, yawed as pitched."""
-    found = held_in_tube(solids(body, TubePose(1.0, 0.2, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)])
+    found = solve_unit_motions(
+        solids(body, TubePose(1.0, 0.2, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)]
+    )
     whole = thirteen(found)
     scale = np.sqrt(np.diag(whole))
     assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
@@ -117,9 +119,9 @@ def test_continuous_where_the_yaw_goes_to_zero(body: str, pitch: float, yaw: flo
 
 def test_a_sphere_does_not_feel_its_yaw() -> None:
     fineness, ball = Fineness(tolerance=1e-4, order=8), [(BODIES["ball"], 0)]
-    level = thirteen(held_in_tube(Solids(ball, TubePose(1.0, 0.3), fineness), []))
+    level = thirteen(solve_unit_motions(Solids(ball, TubePose(1.0, 0.3), fineness), []))
     pose = TubePose(1.0, 0.3, -0.2, yaw=0.3)
-    yawed = thirteen(held_in_tube(Solids(ball, pose, fineness), []))
+    yawed = thirteen(solve_unit_motions(Solids(ball, pose, fineness), []))
     c, s, cos, sin = np.cos(0.2), np.sin(-0.2), np.cos(0.3), np.sin(0.3)
     to_place = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     scale = np.sqrt(np.diag(level))
@@ -143,8 +145,8 @@ def test_several_tails_against_one_factorisation() -> None:
     """A table's way: solids once, any tail at any phase."""
     pose = TubePose(1.0, 0.1, 0.1, yaw=0.15)
     shared = solids("ball", pose, COARSE)
-    held_in_tube(shared, [(coil(), 1)])
+    solve_unit_motions(shared, [(coil(), 1)])
     alone = Solids([(BODIES["ball"], 0)], pose, shared.fineness, np.array([[-0.7, 0.15, coil().blob]]))
-    one, other = (thirteen(held_in_tube(s, [(coil(2.0, -1.0), 1)])) for s in (shared, alone))
+    one, other = (thirteen(solve_unit_motions(s, [(coil(2.0, -1.0), 1)])) for s in (shared, alone))
     assert difference(one, other) < 1e-3
     assert len(shared.factors) == 1

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.measurement.outliers import without_lead
+from spirillum.measurement.outliers import without_codec_lag
 from spirillum.measurement.trials import trial_of
 from spirillum.view.figures.measurement import trial_figure
 from spirillum.vision.track.track import Track
@@ -23,7 +23,7 @@ def test_the_first_frames_of_a_film_that_is_ahead_are_grey(
         position[0, 0] += 1e-4
         tail[0] += 0.2
         track = replace(track, position=position, tail_phase=tail)
-    assert (without_lead(track) is not track) is ahead
+    assert (without_codec_lag(track) is not track) is ahead
     axes = trial_figure(trial_of(track, robot)).axes
     assert ("\ngrey, left out: first frames" in axes[0].get_title(loc="left")) is ahead
     grey = next(line for line in axes[0].lines if line.get_color() == "#999999")

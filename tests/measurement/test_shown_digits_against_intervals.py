@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spirillum.measurement.statistics import shown
+from spirillum.measurement.statistics import rounded_with_ends
 
 
 @pytest.mark.parametrize(
@@ -29,13 +29,13 @@ from spirillum.measurement.statistics import shown
     ],
 )
 def test_texts(value: float | None, low: float | None, high: float | None, unit: str, texts: tuple[str, ...]) -> None:
-    assert shown(value, low, high, unit) == texts
+    assert rounded_with_ends(value, low, high, unit) == texts
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-4, 1e2))
 def test_rounding_is_small_against_the_interval_and_no_digit_is_idle(value: float, half_width: float) -> None:
     """In seconds, which are read as they are: an error of 5 % of the half width at most."""
-    found = shown(value, value - half_width, value + half_width, "s")
+    found = rounded_with_ends(value, value - half_width, value + half_width, "s")
     if abs(value) < 1e5 * half_width:  # else seven digits are enough
         assert abs(float(found.value) - value) <= 0.0501 * half_width
     decimals = len(found.value.partition(".")[2])

@@ -11,7 +11,7 @@ from scipy.stats import t
 
 import spirillum as sp
 from spirillum.measurement.measure import Measurement, compared, summary_of
-from spirillum.measurement.outliers import without_lead
+from spirillum.measurement.outliers import without_codec_lag
 from spirillum.measurement.series import observation_rows
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, Trial, trial_of
 from spirillum.units import Hz
@@ -241,9 +241,9 @@ def test_first_frames_that_are_ahead_do_not_slow_the_robot(make_track: Make, mak
 
 
 def test_a_track_that_begins_as_it_goes_on_keeps_its_first_frames(make_track: Make) -> None:
-    kept = [without_lead(track) is track for track in (make_track(seed=seed) for seed in range(100))]
+    kept = [without_codec_lag(track) is track for track in (make_track(seed=seed) for seed in range(100))]
     assert sum(kept) > 75  # chance leaves them out 14 times in 100
-    assert without_lead(short := make_track(span=1.0)) is short
+    assert without_codec_lag(short := make_track(span=1.0)) is short
 
 
 def test_a_seal_that_shows_no_stripes_widens_the_velocity(make_trial: MakeTrial) -> None:
@@ -301,7 +301,7 @@ def test_the_first_frames_of_a_robot_whose_rate_changes_are_kept(make_track: Mak
     errors = track.body_angle + 0.7 * time
     slowing = -0.2 * time - 0.15 * (1.0 - np.exp(-time / 0.8)) + 0.2 * errors
     track = replace(track, position=position, tail_phase=tail, body_angle=slowing)
-    assert without_lead(track) is not track
+    assert without_codec_lag(track) is not track
     trial = trial_of(track, robot)
     assert np.isfinite(trial.fits["body_rotation_rate"].residual[:6]).all()
     found = trial.quantities["body_rotation_rate"]

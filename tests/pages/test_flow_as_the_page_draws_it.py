@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spirillum.pages.page_robot import plane_shown
+from spirillum.pages.page_robot import page_plane
 
 
 def test_plane_is_the_datasets_own() -> None:
@@ -18,7 +18,7 @@ def test_plane_is_the_datasets_own() -> None:
         {"x": x, "z": z},
         {"model": "slender", "warnings": "one\ntwo"},
     )
-    shown = plane_shown(plane, 0.5)
+    shown = page_plane(plane, 0.5)
     sent = [np.frombuffer(base64.b64decode(part), "<f4").reshape(5, 8) for part in shown["velocity"]]
     assert shown["size"] == [8, 5]
     assert sent[0][3, 2] != sent[0][3, 2]  # NaN: inside a solid

@@ -268,9 +268,9 @@ def _knob(swimmer: dict[str, Any], field: str) -> Any:
 
 def test_guard_beyond_the_loopback_takes_addresses_but_no_foreign_names() -> None:
     guard = Guard("0.0.0.0", 8000)
-    assert guard.own_host("192.0.2.7:8000")
-    assert not guard.own_host("evil.example:8000")
-    assert not Guard("127.0.0.1", 8000).own_host("192.0.2.7:8000")
+    assert guard.is_own_host("192.0.2.7:8000")
+    assert not guard.is_own_host("evil.example:8000")
+    assert not Guard("127.0.0.1", 8000).is_own_host("192.0.2.7:8000")
 
 
 @pytest.mark.parametrize("host", ["", " ", "0", "0x0", "010.0.0.1", "<broadcast>", "a b", "-a", "a..b", "[::1]", "\0"])

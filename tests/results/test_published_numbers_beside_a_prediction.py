@@ -5,14 +5,14 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.published import other_tube, published_beside
+from spirillum.papers.biorob2012.published import other_tube, published_values
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
 
 
 def test_the_papers_largest_decrease_stands_beside_ours_in_both_channels() -> None:
     wide, narrow = sp.predict(WIDE), sp.predict(NARROW)
-    (from_wide,), (from_narrow,) = (published_beside(one, other_tube(one)) for one in (wide, narrow))
+    (from_wide,), (from_narrow,) = (published_values(one, other_tube(one)) for one in (wide, narrow))
     assert from_wide["published"] == from_narrow["published"] == {"value": pytest.approx(0.648e-3), "unit": "m/s"}
     held = wide.forward_velocity - narrow.forward_velocity
     trial = wide.trial.values["forward_velocity"] - narrow.trial.values["forward_velocity"]
@@ -34,4 +34,4 @@ def test_the_papers_largest_decrease_stands_beside_ours_in_both_channels() -> No
 )
 def test_other_requests_have_no_published_number(overrides: dict[str, Any], options: dict[str, Any]) -> None:
     found = sp.predict(sp.load(WIDE, **overrides), **options)
-    assert published_beside(found, other_tube(found)) == []
+    assert published_values(found, other_tube(found)) == []

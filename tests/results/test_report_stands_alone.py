@@ -15,7 +15,7 @@ from spirillum.papers import biorob2012
 from spirillum.papers.claim import Claim
 from spirillum.results.study import write_report
 from spirillum.results.study_content import FRICTION_MEANINGS
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.view.figures.sheet import Picture
 from spirillum.view.figures.style import new_figure
 
@@ -154,7 +154,7 @@ def test_page_holds_settings_versions_and_references(paper: tuple[Path, Page, An
 
 
 def test_every_friction_reading_has_a_meaning() -> None:
-    assert set(FRICTION_MEANINGS) == set(FrictionReading.__args__)
+    assert set(FRICTION_MEANINGS) == set(FrictionModel.__args__)
 
 
 @pytest.mark.usefixtures("blank")

@@ -20,8 +20,8 @@ def test_text_and_floats_are_the_same() -> None:
     assert Placement.of({"eccentricity": 1}) == Placement.of({"eccentricity": 1.0})
     assert Placement.of(text) is text
     assert Placement.of(None) == Placement.of({}) == Placement.of({"gap": None}) == Placement()
-    assert not Placement().is_given
-    assert all(Placement.of(given).is_given for given in ({"ends": "closed"}, {"flow": 0.0}, {"pitch": 0.0}))
+    assert not Placement().is_set
+    assert all(Placement.of(given).is_set for given in ({"ends": "closed"}, {"flow": 0.0}, {"pitch": 0.0}))
 
 
 def test_ends_in_force() -> None:

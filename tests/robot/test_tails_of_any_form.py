@@ -210,7 +210,7 @@ def test_what_follows_from_points_is_no_number_of_its_own() -> None:
     robot = load("biorob2012-wide", tail={"curve": helix()})
     assert robot.source_of("tail.wavelength") == "tail.curve"
     assert robot.source_of("tail.wire_diameter") is None
-    fields = [knob["field"] for knob in Settings("biorob2012-wide").shown(robot)]
+    fields = [knob["field"] for knob in Settings("biorob2012-wide").knob_data(robot)]
     assert "tail.amplitude" not in fields
     assert "tail.wire_diameter" in fields
     with pytest.raises(InputError, match=r"vary tail\.wavelength follows from tail\.curve"):

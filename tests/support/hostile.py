@@ -413,20 +413,20 @@ def whole_files(folder: Path) -> dict[str, bytes]:
     from spirillum.results import study as written
     from spirillum.studies import run
 
-    kept, period = run.keep, run._PERIOD
+    kept, period = run.store_answer, run._PERIOD
 
     def copied(number: int, task: Any, part: Any, parts: Path) -> None:
         kept(number, task, part, parts)
         if not (folder / "part.npz").exists():
             shutil.copy(next(parts.glob("part-*.npz")), folder / "part.npz")
 
-    report, run.keep, written.write_report = written.write_report, copied, lambda *_, **__: None
+    report, run.store_answer, written.write_report = written.write_report, copied, lambda *_, **__: None
     run._PERIOD = -1.0  # each part is kept at once
     try:
         sp.study(folder / "s.toml", output=folder / "out")
         sp.study(folder / "s.toml", store=folder / "out.zarr")
     finally:
-        run.keep, run._PERIOD, written.write_report = kept, period, report
+        run.store_answer, run._PERIOD, written.write_report = kept, period, report
     import pyarrow as pa
     from pyarrow import parquet
 

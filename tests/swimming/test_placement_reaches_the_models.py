@@ -64,7 +64,7 @@ def test_resistance(walled: Any) -> None:
 def test_comparison_places_those_that_ask(walled: Any) -> None:
     answer = sp.compare_models(WIDE, models=["sbt", "walled"], tail_rate="1 Hz", placement=LOW)
     assert answer.predictions["walled"].batch.placement == Placement.of(LOW)
-    assert not answer.predictions["sbt"].batch.placement.is_given
+    assert not answer.predictions["sbt"].batch.placement.is_set
     assert any("wall effects are modelled by walled and not by sbt" in sentence for sentence in answer.warnings)
     both = sp.compare_models(WIDE, models=["sbt", "walled"], tail_rate="1 Hz", calibrated=True)
     assert not any("for sbt and not for walled" in sentence for sentence in both.warnings)

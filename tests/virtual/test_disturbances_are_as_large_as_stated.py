@@ -52,11 +52,11 @@ def test_the_lamp_drifts_by_its_share() -> None:
 
 
 def test_as_many_frames_are_lost_as_stated_but_not_the_ends() -> None:
-    kept = of(dropped=0.05).kept(600)
+    kept = of(dropped=0.05).retained_frames(600)
     assert kept.sum() == 570
     assert kept[0]
     assert kept[-1]
-    assert of().kept(600).all()
+    assert of().retained_frames(600).all()
 
 
 def test_the_tilt_has_its_size_and_any_direction() -> None:
@@ -71,7 +71,7 @@ def test_glare_covers_its_share_of_the_body() -> None:
     light = np.zeros((480, 640, 3), dtype=np.float32)
     place = np.array([0.01, 0.0, 0.0115])
     Disturbances(Degradation(glare=0.2), 3, lens, 20.0, BODY, 0.03).disturb(light, 1.0, place)
-    edge = lens.seen(place + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))[:, 0]
+    edge = lens.project(place + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))[:, 0]
     body = (abs(edge[1] - edge[0]) / 1e-3) ** 2 * BODY[0] * BODY[1] * 0.94
     assert (light[..., 0] > 0.4).sum() == pytest.approx(0.2 * body, rel=0.1)
 
@@ -104,7 +104,7 @@ def test_a_hand_passes_and_bubbles_stay_few() -> None:
 
 def test_one_disturbance_does_not_change_another() -> None:
     alone, together = of(4, dropped=0.1), of(4, dropped=0.1, noise=8.0, bubbles=4, hand=True, glare=0.3)
-    assert (alone.kept(100) == together.kept(100)).all()
+    assert (alone.retained_frames(100) == together.retained_frames(100)).all()
 
 
 def test_presets_and_wrong_values() -> None:
@@ -124,6 +124,6 @@ def test_presets_and_wrong_values() -> None:
 def test_the_glass_darkens_its_edges_and_leaves_the_middle() -> None:
     tank = tank_of(load("biorob2012-wide"), "top")
     over = Painter(load("biorob2012-wide"), tank, LENS).still.over
-    edge = LENS.seen(np.array([[0.0, 0.5 * (tank.tube + tank.outside), tank.tube_height]]))[0]
+    edge = LENS.project(np.array([[0.0, 0.5 * (tank.tube + tank.outside), tank.tube_height]]))[0]
     assert over[round(edge[1]), 160] < 0.8
     assert over[120, 160] > 0.9

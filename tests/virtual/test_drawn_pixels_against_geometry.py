@@ -84,8 +84,8 @@ def test_straight_edges_stand_for_bent_ones(view: str) -> None:
         for solid in solids_of(robot):
             ends = solid.vertices + np.array([x, 0.0, tank.tube_height - 0.0105])
             pairs = np.concatenate([solid.faces[:, [0, 1]], solid.faces[:, [1, 2]], solid.faces[:, [2, 0]]])
-            first, last = (lens.seen(ends[pairs[:, k]])[:, :2] for k in (0, 1))
-            middle = lens.seen(0.5 * (ends[pairs[:, 0]] + ends[pairs[:, 1]]))[:, :2]
+            first, last = (lens.project(ends[pairs[:, k]])[:, :2] for k in (0, 1))
+            middle = lens.project(0.5 * (ends[pairs[:, 0]] + ends[pairs[:, 1]]))[:, :2]
             along, off = last - first, middle - first
             bend = np.abs(along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]) / np.linalg.norm(along, axis=1)
             assert bend[(middle[:, 0] > 0) & (middle[:, 0] < 639)].max() < 0.01
@@ -95,7 +95,7 @@ def test_the_silhouette_of_the_body_moves_as_its_vertices_do() -> None:
     robot = sp.load("biorob2012-wide")
     lens = VirtualLens(20.0, 0.06, 1.4, 20.0 * 740 / 0.19, (320, 120))  # from far away: every part moves alike
     solid = solids_of(robot)[0]
-    seen = lens.seen(solid.vertices + np.array([0.0, 0.0, 0.0115]))
+    seen = lens.project(solid.vertices + np.array([0.0, 0.0, 0.0115]))
     v, u = np.mgrid[2:122, 3:323]
     shifts = np.linspace(0.0, 1.0, 11)
     found = []
@@ -114,7 +114,7 @@ def test_ruler_lines_lie_where_the_lens_sees_them() -> None:
     still = backdrop(tank, lens)
     across = tank.ruler + 4e-3
     for x in np.arange(-30, 31, 2) * 1e-3:
-        u, v, _ = lens.seen(np.array([[x, across, 0.0]]))[0]
+        u, v, _ = lens.project(np.array([[x, across, 0.0]]))[0]
         rows, columns = slice(round(v) - 4, round(v) + 5), slice(round(u) - 3, round(u) + 4)
         light = still.light[rows, columns, 1].astype(float).mean(axis=0)
         dark = light.max() - light
@@ -130,7 +130,7 @@ def test_a_blurred_edge_spreads_over_its_way() -> None:
     rates = {"forward_velocity": 0.0, "body_rotation_rate": 0.0, "tail_rotation_rate": 30.0}
     trajectory = steady_trajectory(1.0, **rates, position=place)
     sharp, blurred = (painter.light(trajectory, 0.5, exposure) for exposure in (0.0, 1 / 60))
-    body = lens.seen(np.array([[0.02, -0.009, 0.0], [0.04, 0.009, 0.0]]))[:, :2].round().astype(int)
+    body = lens.project(np.array([[0.02, -0.009, 0.0], [0.04, 0.009, 0.0]]))[:, :2].round().astype(int)
     rows, columns = slice(body[1, 1], body[0, 1]), slice(body[0, 0], body[1, 0])
     assert np.abs(sharp[rows, columns] - blurred[rows, columns]).max() < 0.05  # the body stands still
     tail = slice(0, 120)

@@ -76,7 +76,7 @@ def test_lines_of_grid_paper_lie_where_the_lens_sees_them(axis: int) -> None:
     for number in (-10, -5, 5, 10, 15):  # each fifth line is strong
         place = np.array([[1.0e-3, 1.0e-3, 0.0]])
         place[0, axis] = number * 2e-3
-        u, v, _ = LENS.seen(place)[0]
+        u, v, _ = LENS.project(place)[0]
         rows, columns = slice(round(v) - 3, round(v) + 4), slice(round(u) - 3, round(u) + 4)
         light = still.light[rows, columns, 1].astype(float).mean(axis=axis)
         dark = np.maximum(np.median(light) - light, 0.0)
@@ -107,9 +107,9 @@ def test_a_cover_changes_the_body_before_its_seal_and_turns_with_it() -> None:
     plain = Painter(robot, tank, LENS).light(path, 0.5, 0.0)
     covered = Painter(robot, tank, LENS, covered=True)
     glass = covered.light(path, 0.5, 0.0)
-    seal = LENS.seen(np.array([[0.03 - 6.5e-3, 0.0, path.position[0, 2] + 9e-3]]))[0, 0]
+    seal = LENS.project(np.array([[0.03 - 6.5e-3, 0.0, path.position[0, 2] + 9e-3]]))[0, 0]
     changed = np.flatnonzero(np.abs(glass - plain).max(axis=(0, 2)) > 0.01)
-    nose = LENS.seen(np.array([[0.03 + 17.5e-3, 0.0, path.position[0, 2]]]))[0, 0]
+    nose = LENS.project(np.array([[0.03 + 17.5e-3, 0.0, path.position[0, 2]]]))[0, 0]
     assert seal - 4 < changed.min() < seal + 2
     assert nose - 2 < changed.max() < nose + 2
     # Stripes come back after half a turn; the battery's faces differ.
@@ -128,12 +128,12 @@ def test_a_robot_without_a_seal_has_no_cover() -> None:
 def test_mirrored_lamps_stand_still_and_add_light() -> None:
     view = ViewArtifacts(Troubles(mirrored_lamps=2), 4, (160, 120))
     dark, bright = np.zeros((120, 160, 3), dtype=np.float32), np.full((120, 160, 3), 0.3, dtype=np.float32)
-    first, later = view.seen(dark, 0.0), view.seen(bright, 7.0) - bright
+    first, later = view.camera_picture(dark, 0.0), view.camera_picture(bright, 7.0) - bright
     assert later == pytest.approx(first, abs=1e-6)
     assert 0.02 < (first > 0.1).mean() < 0.3
     assert first.dtype == np.float32
-    assert np.any(first != ViewArtifacts(Troubles(mirrored_lamps=2), 5, (160, 120)).seen(dark, 0.0))
-    assert ViewArtifacts(Troubles(), 4, (160, 120)).seen(dark, 0.0) is dark
+    assert np.any(first != ViewArtifacts(Troubles(mirrored_lamps=2), 5, (160, 120)).camera_picture(dark, 0.0))
+    assert ViewArtifacts(Troubles(), 4, (160, 120)).camera_picture(dark, 0.0) is dark
 
 
 def test_the_truth_is_that_of_the_same_robot(tmp_path) -> None:

@@ -109,13 +109,13 @@ def test_a_blurred_point_has_the_stated_spread_and_cables_cover_their_share():
     pytest.importorskip("cv2")
     light = np.zeros((61, 81, 3), dtype=np.float32)
     light[30, 40] = 1.0
-    seen = ViewArtifacts(Troubles(blurred=2.0), 0, (81, 61)).seen(light, 0.0)[..., 0]
+    seen = ViewArtifacts(Troubles(blurred=2.0), 0, (81, 61)).camera_picture(light, 0.0)[..., 0]
     v, u = np.mgrid[:61, :81]
     assert seen.sum() == pytest.approx(1.0, rel=1e-5)
     assert (seen * (u - 40.0) ** 2).sum() == pytest.approx(4.0, rel=0.02)
     assert (seen * (v - 30.0) ** 2).sum() == pytest.approx(4.0, rel=0.02)
     white = np.ones((480, 640, 3), dtype=np.float32)
-    dark = ViewArtifacts(Troubles(cables=2), 4, (640, 480)).seen(white, 0.0)[..., 0]
+    dark = ViewArtifacts(Troubles(cables=2), 4, (640, 480)).camera_picture(white, 0.0)[..., 0]
     assert dark.min() == pytest.approx(0.02, abs=1e-3)
     across = (dark < 0.5).sum(axis=1)  # each an eightieth of the width, more where it leans
     assert across.min() >= 2 * 8

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.vision.track.colours import colour_classes, named_colours, told_apart
+from spirillum.vision.track.colours import are_distinguishable, colour_classes, named_colours
 
 NAMES = ("red", "yellow", "green", "blue")
 
@@ -18,10 +18,10 @@ def samples(colours: np.ndarray, lamp: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("lamp", [(1.0, 1.0, 1.0), (1.0, 0.85, 0.6), (0.4, 0.4, 0.4)])
 def test_painted_stripes_are_told_apart(lamp: tuple[float, ...]) -> None:
     seen = samples(named_colours(NAMES), np.array(lamp))
-    assert told_apart(seen, colour_classes(seen, NAMES))
+    assert are_distinguishable(seen, colour_classes(seen, NAMES))
 
 
 @pytest.mark.parametrize("name", ["white", "green", "black", "blue"])
 def test_a_seal_of_one_colour_is_not(name: str) -> None:
     seen = samples(named_colours([name]), np.ones(3))
-    assert not told_apart(seen, colour_classes(seen, NAMES))
+    assert not are_distinguishable(seen, colour_classes(seen, NAMES))

@@ -6,7 +6,7 @@ A robot whose tail turns while it stays where it is has no speed.
 import numpy as np
 import pytest
 
-from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
+from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, standstill_flag
 from spirillum.vision.track.track import RobotMotion
 
 PIXEL = 2.5e-4
@@ -127,11 +127,11 @@ def test_a_robot_that_turns_but_does_not_advance_has_no_speed():
         RobotMotion(true, still, body, unseen),
         RobotMotion(true, still, unseen, tail),
     ):
-        (flag,) = stands_still(motion, PIXEL)
+        (flag,) = standstill_flag(motion, PIXEL)
         assert flag.name == "does-not-advance"
         assert set(flag.spoils) >= {"forward_velocity", "tail_rotation_rate"}
         assert "body_rotation_rate" not in flag.spoils
-    assert "its tail turns 12.0 times" in stands_still(RobotMotion(true, still, body, tail), PIXEL)[0].sentence
+    assert "its tail turns 12.0 times" in standstill_flag(RobotMotion(true, still, body, tail), PIXEL)[0].sentence
 
 
 def test_slow_and_resting_robots_are_not_said_to_stand():
@@ -145,7 +145,7 @@ def test_slow_and_resting_robots_are_not_said_to_stand():
         RobotMotion(true, rest, np.zeros(x.size), np.full(x.size, np.nan)),
         RobotMotion(true, np.full(x.size, np.nan), body, tail),
     ):
-        assert stands_still(motion, PIXEL) == ()
+        assert standstill_flag(motion, PIXEL) == ()
 
 
 def test_one_picture_again_and_again_gives_nothing():

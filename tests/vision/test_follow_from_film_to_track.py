@@ -107,7 +107,7 @@ def test_a_robot_that_is_clear_only_the_other_way_round_names_the_direction(flat
     from spirillum.vision.track import initial_detection
 
     answers = iter([False, True])
-    monkeypatch.setattr(initial_detection, "_found_by_seal", lambda *given: None)
+    monkeypatch.setattr(initial_detection, "_detect_by_seal", lambda *given: None)
     monkeypatch.setattr(initial_detection, "_clear", lambda found: next(answers, False))
     monkeypatch.setattr("spirillum.vision.track.identity.best_other_size", lambda *given: None)
     with pytest.raises(InputError, match=r"robot.direction = 'right', but .* other side; allowed: 'left'"):

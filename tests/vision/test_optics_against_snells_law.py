@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.vision.camera.optics import BodyPose, Optics, placed, seen
+from spirillum.vision.camera.optics import BodyPose, Optics, placed, project
 
 UPRIGHT = Optics((640, 480), 740.0, 0.21, 0.0115, 0.06, 1.4)
 
@@ -63,4 +63,4 @@ def test_a_pose_moves_and_turns_the_body():
     there = placed(body, BodyPose(0.1, 0.2, np.pi / 2), 0.03)
     assert there == pytest.approx(np.array([[0.1, 0.21, 0.03], [0.09, 0.2, 0.032]]), abs=1e-15)
     pose = BodyPose(0.01, 0.002, 0.1)
-    assert seen(body, pose, UPRIGHT) == pytest.approx(UPRIGHT.pixels(placed(body, pose, 0.0115)), abs=0.0)
+    assert project(body, pose, UPRIGHT) == pytest.approx(UPRIGHT.pixels(placed(body, pose, 0.0115)), abs=0.0)

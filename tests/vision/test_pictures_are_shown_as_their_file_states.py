@@ -141,7 +141,7 @@ def test_an_unknown_kind_of_side_data_hides_no_rotation(quarters):
 
     picture = np.arange(12, dtype=np.uint8).reshape(3, 4)
     display, _ = frame_display(Frame(), 1.0)
-    assert np.array_equal(display.shown(picture), np.rot90(picture, quarters))
+    assert np.array_equal(display.display_picture(picture), np.rot90(picture, quarters))
 
 
 def test_a_turn_that_is_no_quarter_is_mentioned(tmp_path):

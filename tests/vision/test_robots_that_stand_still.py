@@ -6,7 +6,7 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.vision.track import identity
-from spirillum.vision.track.cuts import stands_flag
+from spirillum.vision.track.cuts import no_motion_flag
 from spirillum.vision.track.track import RobotMotion
 
 pytest.importorskip("av")
@@ -81,12 +81,14 @@ def test_standing_is_told_from_small_motion():
     rng = np.random.default_rng(0)
     noise = rng.normal(0.0, 1.0, (3, 60)) * np.array([[0.02 * PIXEL], [0.002], [0.005]])
     still = RobotMotion(time, *noise)
-    assert [flag.name for flag in stands_flag(still, PIXEL)] == ["robot-stands-still"]
+    assert [flag.name for flag in no_motion_flag(still, PIXEL)] == ["robot-stands-still"]
     for moving in (
         still._replace(x=still.x + 0.1 * PIXEL * time),
         still._replace(body_angle=still.body_angle + 0.02 * time),
         still._replace(tail_phase=still.tail_phase - 0.02 * time),
     ):
-        assert stands_flag(moving, PIXEL) == ()
+        assert no_motion_flag(moving, PIXEL) == ()
     unread = np.full(60, np.nan)
-    assert stands_flag(RobotMotion(time, still.x, unread, unread), PIXEL) == ()  # it may be anything that stands there
+    assert (
+        no_motion_flag(RobotMotion(time, still.x, unread, unread), PIXEL) == ()
+    )  # it may be anything that stands there

@@ -9,7 +9,7 @@ from spirillum.errors import InputError
 from spirillum.vision.camera.camera import sight_of
 from spirillum.vision.camera.optics import Optics, optics_of
 from spirillum.vision.camera.ruler import lines_in, still_picture
-from spirillum.vision.camera.scale import fitted_camera, given_camera
+from spirillum.vision.camera.scale import camera_of_setup, fitted_camera
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Video
 
@@ -187,7 +187,7 @@ def test_a_given_scale_is_that_of_the_axis():
     given = setup().model_copy(
         update={"markers": setup().markers.model_copy(update={"spacing": None, "length_per_pixel": 2.5e-4})}
     )
-    sight = given_camera(given, SIZE)
+    sight = camera_of_setup(given, SIZE)
     assert sight.optics.length_per_pixel == pytest.approx(2.5e-4, rel=1e-9)
     assert sight.scale.markers == 0
 

@@ -202,6 +202,6 @@ def test_an_outline_that_does_not_settle_gives_way_to_the_seal(film, monkeypatch
     frames = [Frame(k, time, film.draw(time)) for k, time in enumerate(film.times.tolist())]
     body = BodyFinder(film.robot, CAMERA, (0, 0, *film.size), colours=4)
     move = BodyPose(0.0, off * CAMERA.length_per_pixel, 0.0)
-    monkeypatch.setattr(initial_detection, "outline_seen", lambda *_: OutlineFit(1.0, move))
+    monkeypatch.setattr(initial_detection, "apparent_outline", lambda *_: OutlineFit(1.0, move))
     start = detect_robot("film", body, frames, np.zeros((*film.size[::-1], 3)), colours=4)
     assert bool(start.body.colours) == (off > 0.0)

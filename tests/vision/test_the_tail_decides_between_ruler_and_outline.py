@@ -74,7 +74,7 @@ def test_a_file_is_not_blamed_where_outline_or_light_are_in_doubt(flat_pictures,
     setup, robot = load_setup(tmp_path / "setup.toml")
     wave = TailWave(robot, setup, optics_of(setup, flat.size, flat.focal))
     wave.learn([(picture, BodyPose(float(flat.truth(at)["x"]), 0.0, 0.0)) for at, picture in flat.pictures()])
-    (sure,) = wave.flags_beside(doubtful=False)
+    (sure,) = wave.flags_given_doubt(doubtful=False)
     assert sure.name == "tail-does-not-fit"
     assert "tail.wavelength looks like 3" in sure.sentence
-    assert [flag.name for flag in wave.flags_beside(doubtful=True)] == ["tail-unreadable"]
+    assert [flag.name for flag in wave.flags_given_doubt(doubtful=True)] == ["tail-unreadable"]

@@ -230,7 +230,7 @@ def _tails(found: Calibrated) -> list[dict[str, Any]]:
                 if np.isfinite(values := getattr(problem.ratio(name), key))[place]
             }
             for name in problem.quantities
-            if problem.ratio(name).seen[place]
+            if problem.ratio(name).is_observed[place]
         }
         tails.append(
             {

@@ -34,7 +34,7 @@ from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
-from spirillum.swimming.drawn_resistance import error_of_mean
+from spirillum.swimming.sampled_resistance import error_of_mean
 
 Quantity = Literal["advance", "turning", "motor_rate"]  #: U/omega (or U/omega_m), Omega/omega, omega_m.
 
@@ -72,10 +72,10 @@ class Ratio:
     @property
     def explained(self) -> bool:
         """Whether every mean has an error, stated or by the scatter of trials."""
-        return self.freedom.sum() > 0 or bool(np.all(np.isfinite(self.stated[self.seen])))
+        return self.freedom.sum() > 0 or bool(np.all(np.isfinite(self.stated[self.is_observed])))
 
     @property
-    def seen(self) -> np.ndarray:
+    def is_observed(self) -> np.ndarray:
         """Whether it was observed, robot by robot."""
         return np.isfinite(self.mean)
 

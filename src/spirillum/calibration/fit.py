@@ -93,7 +93,7 @@ _FRICTION_DRAWS = 2000
 RobotSource = str | Path | Mapping[str, Any] | Robot
 
 
-def given_robots(robots: RobotSource | Sequence[RobotSource]) -> list[Robot]:
+def load_robots(robots: RobotSource | Sequence[RobotSource]) -> list[Robot]:
     """One robot or several, loaded."""
     several = isinstance(robots, Sequence) and not isinstance(robots, str)
     items: Sequence[Any] = robots if several else [robots]  # type: ignore[assignment]
@@ -133,12 +133,12 @@ def fit_model(
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
-    experiment = read_experiment(observations, given_robots(robots))
+    experiment = read_experiment(observations, load_robots(robots))
     choice = choose_fitted_model(model, experiment, free, method)
     names = free_names(free, choice.model, released=answer == RELEASED)
     robot = experiment.robots[0]
     driven = robot.drive is not None and robot.drive.kind == "dc-motor" and robot.drive.joint == "revolute"
-    if free is None and not (driven and robot.motor is not None and np.any(experiment.motor_rate.seen)):
+    if free is None and not (driven and robot.motor is not None and np.any(experiment.motor_rate.is_observed)):
         names = tuple(name for name in names if name not in ("friction", "shared_friction"))
     if method == "posterior":  # before tables and trials are computed
         for library in ("emcee", "arviz_base", "arviz_stats"):
@@ -214,7 +214,7 @@ def _by_draws(
         middle, error, of_a_trial, draws = fit.z, fit.error, fit.error, problem.values(z)
         values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(middle).items()}
         # Moments of a few residuals may give none, or one at the end of what may be: the middle of that is stated.
-        discrepancy = {name: _middle(tau[name]) for name in fit.discrepancy}
+        discrepancy = {name: _median(tau[name]) for name in fit.discrepancy}
     else:
         chosen = posterior.flat[rng.permutation(posterior.flat.shape[0])[:_FRICTION_DRAWS]]
         free = posterior.flat[:, : len(problem.coordinates)]
@@ -223,8 +223,8 @@ def _by_draws(
         tau, sigma = posterior.density.nuisances(chosen)
         error = {name: float(np.median(s)) for name, s in sigma.items()}
         of_a_trial = {name: float(np.median(every[f"error_{name}"])) for name in problem.quantities}
-        values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
-        discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
+        values = {item.label: _median(every[item.label]) for item in problem.coordinates}
+        discrepancy = {name: _median(every[f"discrepancy_{name}"]) for name in problem.quantities}
         unusable = [Note.named("posterior-not-usable", words=words) for words in posterior.problems()]
         unusable += edge_warnings(problem, free)
     given, within, friction = _friction(problem, z, middle, error, reading, rng)
@@ -270,7 +270,7 @@ def _fitted(value: float, draws: Samples) -> Estimate:
     return Estimate(value, min(low, value), max(high, value))
 
 
-def _middle(draws: Samples) -> Estimate:
+def _median(draws: Samples) -> Estimate:
     return _fitted(float(np.median(draws)), draws)
 
 

@@ -40,9 +40,9 @@ def check_plausible(problem: Problem, z: Samples) -> None:
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
         with np.errstate(divide="ignore", invalid="ignore"):
-            off = np.abs(np.log(np.abs(ratio.mean / values)))[ratio.seen]
+            off = np.abs(np.log(np.abs(ratio.mean / values)))[ratio.is_observed]
         if float(np.median(off)) > np.log(_IMPLAUSIBLE_FACTOR):
-            factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values))[ratio.seen])))
+            factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values))[ratio.is_observed])))
             raise UnexplainedError(
                 f"{source}: the observed {CALLED[name]} is typically {factor:.3g} times what model '{model}' can "
                 "explain; allowed: within a factor of ten (are the columns in mm, mm/s and Hz?)"
@@ -100,8 +100,8 @@ def outlier_warnings(problem: Problem, z: Samples) -> list[Note]:
     found = list(experiment.outliers)
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
-        relative = np.where(ratio.seen, ratio.mean / values - 1.0, np.nan)
-        if np.count_nonzero(ratio.seen) < 5:
+        relative = np.where(ratio.is_observed, ratio.mean / values - 1.0, np.nan)
+        if np.count_nonzero(ratio.is_observed) < 5:
             continue
         off = np.abs(relative - np.nanmedian(relative))
         limit = max(_OUTLYING * float(mad_scale(off)), _LEAST_OUTLYING)
@@ -122,7 +122,7 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
     for name, size in discrepancy.items():
         called, code = CALLED[name], "intervals-incomplete"
         misfit = min(size.value, fit.discrepancy[name])  # by the residuals, and not the prior alone
-        few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).seen) == 1
+        few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).is_observed) == 1
         if (few or one) and misfit > _BEYOND_TRIALS:
             share = percent(fit.discrepancy[name])
             found.append(Note.named("factors-miss", model=model, called=called, share=share, fields=(name,)))
@@ -161,7 +161,7 @@ def factor_misfit_warnings(problem: Problem, z: Samples) -> list[Note]:
     found = []
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
-        size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.seen] ** 2)))
+        size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.is_observed] ** 2)))
         if size > _LARGE_MISFIT:
             words = (
                 f"'{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root mean "
@@ -190,7 +190,7 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[Note]:
 def friction_interval_warnings(problem: Problem) -> list[Note]:
     """What the intervals of B_eff leave out without repeated trials: how trials differ, or all of the rate's error."""
     rate = problem.experiment.motor_rate
-    if "friction" not in problem.free or not rate.seen.any() or rate.freedom.sum() > 0:
+    if "friction" not in problem.free or not rate.is_observed.any() or rate.freedom.sum() > 0:
         return []
     if rate.explained:
         words = (

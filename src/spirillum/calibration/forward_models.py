@@ -43,11 +43,11 @@ from spirillum.swimming.balance import (
     with_body_factors,
 )
 from spirillum.swimming.band import band_poses
-from spirillum.swimming.drawn_resistance import DrawnResistance, Draws, TubeResistance
 from spirillum.swimming.drives import steady_current
 from spirillum.swimming.dry_friction import weights_in_fluid, with_dry_friction
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.preparation import checked_geometries, preparation_time, prepare_all, table_for
+from spirillum.swimming.sampled_resistance import DrawnResistance, Draws, TubeResistance
 
 if TYPE_CHECKING:
     from scipy.interpolate import RBFInterpolator
@@ -339,7 +339,7 @@ def surfaces_of(robots: Sequence[Robot], ends: Ends, progress: Progress | None) 
         scale = np.abs(seen[known]).max(axis=0)
         surfaces.append(_surface(logs[known], seen[known] / scale))
         scales.append(scale)
-        errors.append(_left_out(logs[known], seen[known] / scale))
+        errors.append(_cross_validation_error(logs[known], seen[known] / scale))
     return TrialSurfaces(names, ends, tuple(surfaces), np.array(scales), float(np.max(errors)))
 
 
@@ -363,7 +363,7 @@ def _surface(x: Samples, values: Samples) -> RBFInterpolator:
     return RBFInterpolator(x, values, kernel="thin_plate_spline", degree=1)
 
 
-def _left_out(x: Samples, values: Samples) -> float:
+def _cross_validation_error(x: Samples, values: Samples) -> float:
     """Median relative error of advance and motor rate at every fourth trial, by a surface through the others."""
     apart = np.arange(len(x)) % 4 == 3
     missed = _surface(x[~apart], values[~apart])(x[apart]) - values[apart]

@@ -69,7 +69,7 @@ def check_identifiable(problem: Problem, z: Samples) -> None:
     if len(kept) < 2:
         return
     columns = sensitivities(problem, z)
-    jacobian = np.concatenate([column[problem.ratio(name).seen] for name, column in columns.items()])[:, kept]
+    jacobian = np.concatenate([column[problem.ratio(name).is_observed] for name, column in columns.items()])[:, kept]
     _, singular, directions = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0), full_matrices=False)
     if singular[-1] * _COLLINEAR > 1.0:
         return
@@ -89,7 +89,7 @@ def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
     error = {name: max(np.nan_to_num(value), LEAST_ERROR) for name, value in fit.error.items()}
     jacobian = np.concatenate(list(weighted_sensitivities(problem, fit.z, error, fit.discrepancy).values()))
     columns = sensitivities(problem, fit.z)
-    relative = np.concatenate([column[problem.ratio(name).seen] for name, column in columns.items()])
+    relative = np.concatenate([column[problem.ratio(name).is_observed] for name, column in columns.items()])
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     labels = tuple(item.label for item in problem.coordinates)
     slope = _slopes(problem, fit.z)

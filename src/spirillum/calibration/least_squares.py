@@ -102,7 +102,7 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
     chi2 = float("nan")
     if all(scattered.values()):
         chi2 = float(np.sum(weighted_residuals(problem, z, error, discrepancy, prior=0.0) ** 2))
-    left = _left(problem, z, error, discrepancy)
+    left = _degrees_of_freedom(problem, z, error, discrepancy)
     for turn in range(8):
         found = _discrepancy(problem, z, error, left)
         change = max(abs(found[name] - discrepancy[name]) for name in found)
@@ -110,7 +110,7 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
         if change < 1e-4 and turn:
             break
         z = _best(problem, z, error, discrepancy, starts=1, prior=1.0)
-        left = _left(problem, z, error, discrepancy)
+        left = _degrees_of_freedom(problem, z, error, discrepancy)
     jacobian = np.concatenate(list(weighted_sensitivities(problem, z, error, discrepancy).values()))
     return LeastSquares(
         z=z,
@@ -124,7 +124,7 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
 
 
 def _count(problem: Problem) -> int:
-    return sum(int(np.count_nonzero(problem.ratio(name).seen)) for name in problem.quantities)
+    return sum(int(np.count_nonzero(problem.ratio(name).is_observed)) for name in problem.quantities)
 
 
 def _check_count(problem: Problem) -> None:
@@ -165,7 +165,7 @@ def _check_blind(problem: Problem, z: Samples) -> None:
 
 def _felt(problem: Problem, z: Samples) -> Samples:
     """Largest relative change of what was observed per unit of each coordinate, (free numbers,)."""
-    seen = [np.abs(s[problem.ratio(name).seen]).max(axis=0) for name, s in sensitivities(problem, z).items()]
+    seen = [np.abs(s[problem.ratio(name).is_observed]).max(axis=0) for name, s in sensitivities(problem, z).items()]
     return np.asarray(np.max(seen, axis=0))
 
 
@@ -193,7 +193,7 @@ def _residuals(
     parts = []
     for name, values in predicted.items():
         ratio = problem.ratio(name)
-        parts.append(((ratio.mean - values) / errors[name])[:, ratio.seen])
+        parts.append(((ratio.mean - values) / errors[name])[:, ratio.is_observed])
     found: Samples = np.nan_to_num(np.concatenate([*parts, prior * z], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
     return found
 
@@ -244,11 +244,11 @@ def weighted_sensitivities(
     errors = standard_errors(problem, predicted, error, discrepancy)
     found: dict[Quantity, Samples] = {}
     for name, column in sensitivities(problem, z).items():
-        found[name] = (column * (predicted[name] / errors[name])[:, None])[problem.ratio(name).seen]
+        found[name] = (column * (predicted[name] / errors[name])[:, None])[problem.ratio(name).is_observed]
     return found
 
 
-def _left(
+def _degrees_of_freedom(
     problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
 ) -> dict[Quantity, float]:
     """Degrees of freedom that the fit leaves each quantity: its means less its share in fitting the numbers."""
@@ -267,7 +267,7 @@ def _squares(problem: Problem, z: Samples, error: dict[Quantity, float]) -> dict
     found: dict[Quantity, tuple[float, float]] = {}
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
-        seen = ratio.seen
+        seen = ratio.is_observed
         relative = (ratio.mean[seen] - values[seen]) / values[seen]
         of_mean = ratio.error_of_mean(error[name])[seen] / values[seen]
         found[name] = float(np.mean(relative**2)), float(np.mean(of_mean**2))
@@ -283,7 +283,7 @@ def _discrepancy(
         if left[name] < FEWEST_LEFT:
             found[name] = _MIDDLE * DISCREPANCY_SCALE
             continue
-        count = np.count_nonzero(problem.ratio(name).seen)
+        count = np.count_nonzero(problem.ratio(name).is_observed)
         found[name] = float(np.sqrt(max(square * count / left[name] - expected, 0.0)))
         if found[name] < 1e-9:
             found[name] = 0.0
@@ -300,9 +300,9 @@ def sampled_fit(
     information = np.broadcast_to(np.eye(fit.z.size), (count, fit.z.size, fit.z.size))
     taus: dict[Quantity, Samples] = {}
     for name, (square, expected) in squares.items():
-        seen = problem.ratio(name).seen
+        seen = problem.ratio(name).is_observed
         total = square * np.count_nonzero(seen)
-        taus[name] = _drawn_discrepancy(total, expected, fit.left[name], count, rng)
+        taus[name] = _sampled_discrepancy(total, expected, fit.left[name], count, rng)
         noise = (_noise(problem, name, fit.error[name]) / predicted[name] ** 2)[seen]
         weights = 1.0 / (noise + taus[name][:, None] ** 2)
         information = information + np.einsum("dn,nj,nk->djk", weights, columns[name][seen], columns[name][seen])
@@ -311,7 +311,7 @@ def sampled_fit(
     return z, taus
 
 
-def _drawn_discrepancy(total: float, expected: float, left: float, count: int, rng: np.random.Generator) -> Samples:
+def _sampled_discrepancy(total: float, expected: float, left: float, count: int, rng: np.random.Generator) -> Samples:
     """Draws of a discrepancy given the sum of squares that a fit leaves, and its half-normal prior."""
     grid = np.concatenate([[0.0], np.geomspace(1e-5, 4.0 * DISCREPANCY_SCALE, 600)])
     variance = grid**2 + expected + LEAST_ERROR**2

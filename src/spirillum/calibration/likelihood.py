@@ -92,7 +92,7 @@ class Density:
         for name, values in predicted.items():
             ratio = self.problem.ratio(name)
             s, t = sigma[name][:, None], tau[name][:, None]
-            residual[name] = np.where(ratio.seen, ratio.mean - values, 0.0)
+            residual[name] = np.where(ratio.is_observed, ratio.mean - values, 0.0)
             noise[name] = ratio.error_of_mean(s)
             floor = max(LEAST_RELATIVE, self.problem.interpolation_error)
             variance[name] = noise[name] ** 2 + (t * values) ** 2 + (floor * ratio.scale) ** 2
@@ -100,7 +100,7 @@ class Density:
             total += -0.5 * (ratio.freedom * np.log(trial) + ratio.squares / trial)
         for name in predicted:
             if name != "turning" or "advance" not in predicted:
-                total += np.where(self.problem.ratio(name).seen, _normal(residual[name], variance[name]), 0.0)
+                total += np.where(self.problem.ratio(name).is_observed, _normal(residual[name], variance[name]), 0.0)
         if "turning" in predicted and "advance" in predicted:
             total += self._turning_given_advance(residual, noise, variance)
         return total
@@ -109,8 +109,8 @@ class Density:
         self, residual: dict[Quantity, Samples], noise: dict[Quantity, Samples], variance: dict[Quantity, Samples]
     ) -> Samples:
         """The turning's density, conditional on the advance of the same robot where there is one."""
-        seen = self.problem.ratio("turning").seen
-        both = seen & self.problem.ratio("advance").seen
+        seen = self.problem.ratio("turning").is_observed
+        both = seen & self.problem.ratio("advance").is_observed
         covariance = np.where(both, self.problem.experiment.correlation * noise["advance"] * noise["turning"], 0.0)
         slope = covariance / variance["advance"]
         left = residual["turning"] - slope * residual["advance"]

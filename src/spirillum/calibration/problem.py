@@ -37,8 +37,8 @@ from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
 from spirillum.robot.placement import gap_on_asperities
-from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.released_motion import HELD, RELEASED
+from spirillum.swimming.sampled_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
 
 
@@ -84,7 +84,7 @@ class Problem:
         """What is compared with the observations."""
         names: tuple[Quantity, ...] = ("advance", "turning", "motor_rate")
         kept = names if self.by_motor_rate else names[:2]
-        return tuple(name for name in kept if np.any(self.ratio(name).seen))
+        return tuple(name for name in kept if np.any(self.ratio(name).is_observed))
 
     def ratio(self, quantity: Quantity) -> Ratio:
         """What was observed of a quantity."""
@@ -163,12 +163,12 @@ class Problem:
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor", scaled: Draws | None = None) -> Samples:
         """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
         seen = self.experiment
-        own = {name: factor * self._own(name) for name, factor in (scaled or {}).items()}
+        own = {name: factor * self._shared_constant(name) for name, factor in (scaled or {}).items()}
         with np.errstate(invalid="ignore"):
             share = seen.tail_rate / seen.motor_rate.mean
             return self.forward.friction({**self.draws(z), **own}, motor_rate, share, reading)
 
-    def _own(self, name: str) -> Samples:
+    def _shared_constant(self, name: str) -> Samples:
         """A constant of the robots' fluid or motor, SI, (robots,) or (1,)."""
         return self.forward.viscosity if name == "viscosity" else getattr(self.forward.electrics, name)
 
@@ -279,7 +279,7 @@ def _check_motor(experiment: Experiment, free: Sequence[str], batch: RobotBatch)
             f"free = '{needing[0]}', but robot {experiment.robots[0].name} has no dc-motor; allowed: a robot with "
             "drive.kind = 'dc-motor', [motor] and [battery]"
         )
-    if not np.any(experiment.motor_rate.seen):
+    if not np.any(experiment.motor_rate.is_observed):
         raise InputError(
             f"{experiment.source} has no motor rates, which free = '{needing[0]}' needs; allowed: a column "
             "motor_rate_Hz, or tail_rate_Hz and body_rate_Hz"
@@ -344,7 +344,7 @@ def _prior(problem: Problem, parameter: FitParameter, batch: RobotBatch, ranges:
         found = problem.forward.predict(middle)
         with_load = problem.forward.friction(middle, ratio.mean)[0]
         all_of_it = with_load + found.load[0] / (1.0 - found.turning[0])
-        return LogNormal(float(0.5 * np.median(all_of_it[ratio.seen])), _FRICTION_SPREAD)
+        return LogNormal(float(0.5 * np.median(all_of_it[ratio.is_observed])), _FRICTION_SPREAD)
     source = batch if name in ("viscosity", "wire_diameter") else batch.electrics
     spread = stated_spread(problem.assumed[name]) if name in problem.assumed else _TOLERANCE_SPREAD
     return LogNormal(float(getattr(source, name)[0]), spread)

@@ -27,7 +27,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import channel_of, tail_words, with_tail
-from spirillum.calibration.fit import RobotSource, given_robots
+from spirillum.calibration.fit import RobotSource, load_robots
 from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
@@ -45,7 +45,7 @@ from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.cautions import calibration_warnings
-from spirillum.swimming.intervals import drawn_kinematics
+from spirillum.swimming.intervals import sampled_kinematics
 from spirillum.swimming.model_choice import fitted_with, has_table
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
@@ -144,7 +144,7 @@ def suggest(
     check_range("trials", trials, 1, 10**6)
     check_choice("answer", answer, (HELD, RELEASED))
     known = read_posterior(posterior, answer=answer)
-    given = _papers_robots(known) if robots is None else given_robots(robots)
+    given = _papers_robots(known) if robots is None else load_robots(robots)
     _check_channels(given)
     loaded = [known.central(robot) for robot in given]
     listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
@@ -158,7 +158,7 @@ def suggest(
         if outside:
             left_out.append(Note.named("candidate-left-out", robot=tail_words(robot), outside=outside))
             continue
-        seen = drawn_kinematics(robot, model, known) if answer == HELD else _trial_kinematics(known, robot)
+        seen = sampled_kinematics(robot, model, known) if answer == HELD else _trial_kinematics(known, robot)
         if isinstance(seen, str):
             left_out.append(Note.named("candidate-left-out", robot=tail_words(robot), outside=seen))
             continue
@@ -188,7 +188,7 @@ def suggest(
 
 def _papers_robots(known: PosteriorFile) -> list[Robot]:
     """The paper's robots, for a posterior of these."""
-    robots = given_robots(PAPER_ROBOTS)
+    robots = load_robots(PAPER_ROBOTS)
     channels = [robot.channel.diameter for robot in robots if robot.channel]
     body = (robots[0].body.diameter, robots[0].body.length)
     strange = [c for c in known.channels if not np.any(np.isclose(c, channels, rtol=1e-6, atol=0.0))]

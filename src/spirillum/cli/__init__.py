@@ -57,11 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for ending in (signal.SIGINT, signal.SIGTERM):  # all is done but for the interpreter to leave
             signal.signal(ending, signal.SIG_IGN)
         gc.freeze()
-        _leave_threads(code)
+        _exit_despite_threads(code)
     sys.exit(code)
 
 
-def _leave_threads(code: int) -> None:
+def _exit_despite_threads(code: int) -> None:
     """Leave without the interpreter's own end where a thread is still at work: in compiled code that would abort it."""
     if not any(thread.daemon for thread in threading.enumerate()):
         return

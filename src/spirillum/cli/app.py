@@ -56,9 +56,9 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
     if wanted:
-        from spirillum.version import own_version
+        from spirillum.version import package_version
 
-        typer.echo(f"spirillum {own_version()}")
+        typer.echo(f"spirillum {package_version()}")
         raise typer.Exit
 
 
@@ -90,7 +90,7 @@ def predict(request: Request, *, plot: Path | None = None, all_of_it: All = Fals
     """
     from spirillum.cli import renderer
     from spirillum.kernels.native import run_together
-    from spirillum.papers.biorob2012.published import other_tube, published_beside
+    from spirillum.papers.biorob2012.published import other_tube, published_values
 
     draw = renderer.picture(plot, "prediction.png", "spirillum.view.figures.prediction:prediction_figure")
     with renderer.progress_bar(quiet=json) as progress:
@@ -103,7 +103,7 @@ def predict(request: Request, *, plot: Path | None = None, all_of_it: All = Fals
         answer, _ = run_together(
             lambda: result.to_dict(other_models=compared), lambda: None if beside is None else beside.trial
         )
-        published = published_beside(result, beside)
+        published = published_values(result, beside)
     if published:
         answer = {**answer, "published": published}
     pictures = {} if plot is None else {"plot": draw}

@@ -103,7 +103,7 @@ def _stated(given: Sequence[str]) -> dict[str, str]:
 _A = TypeVar("_A", "Ranking", "Suggestion")
 
 
-def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
+def _note_robots_taken(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
     """Refuse settings without a named robot, where the robots come from another file."""
     from spirillum.robot.load import PAPER_ROBOTS_TAKEN
 
@@ -143,7 +143,7 @@ def rank_models(
     with renderer.progress_bar(quiet=json) as progress:
         robots = [loaded_robot(name, settings) for name in names] or None
         found = request(observations, robots, sampling=Sampling(**request.take("sampling")), progress=progress)
-    renderer.show(_saying_whose(found, robot, settings).to_dict(), json=json)
+    renderer.show(_note_robots_taken(found, robot, settings).to_dict(), json=json)
     if not all(item.fit.converged for item in found.ranked):
         raise typer.Exit(1)
 
@@ -174,7 +174,7 @@ def suggest(
     names = robot or (PAPER_ROBOTS if settings else ())
     robots = [loaded_robot(name, settings, posterior=posterior) for name in names] or None
     with renderer.progress_bar(quiet=json) as progress:
-        found = _saying_whose(request(posterior, robots, progress=progress), robot, settings)
+        found = _note_robots_taken(request(posterior, robots, progress=progress), robot, settings)
     renderer.show(found.to_dict(), json=json, rows=rows)
 
 
@@ -207,7 +207,7 @@ def design(
             pairs_of(vary, "--vary"), unknown=pairs_of(unknown or [], "--unknown"), model=model, progress=progress
         )
     paths = [path for path in (picture, printed, target) if path is not None]
-    with renderer.answer_kept(found.to_dict, json=json), atomic_write_all(paths) as parts:
+    with renderer.answer_before_error(found.to_dict, json=json), atomic_write_all(paths) as parts:
         if picture is not None:
             from spirillum.view.figures.design import design_figure
             from spirillum.view.figures.style import save_as

@@ -105,7 +105,7 @@ def control(
         files: dict[str, Any] = {"file": None if output is None else str(output)}
         if target is not None:
             write_dataset(found.dataset, target)
-        with renderer.answer_kept(lambda: renderer.with_files(found.to_dict(), **files), json=json):
+        with renderer.answer_before_error(lambda: renderer.with_files(found.to_dict(), **files), json=json):
             if picture is not None:
                 from spirillum.view.figures.control import control_figure
                 from spirillum.view.figures.style import save_as

@@ -225,7 +225,9 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
         parameters = [_parameter("robot", source.robot, inspect.Parameter.empty if needed else None)]
     parameters += [_parameter(name, kind, default) for name, (_, kind, default) in made.items()]
     command = source.body.__name__
-    parameters += [_parameter(name, _own(command, name, hints[name]), item.default) for name, item in own.items()]
+    parameters += [
+        _parameter(name, _own_annotation(command, name, hints[name]), item.default) for name, item in own.items()
+    ]
     if source.robot is not None:
         parameters.insert(-1, _parameter("settings", Settings, None))
 
@@ -250,11 +252,11 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
 def own_options(command: Callable[..., None]) -> Callable[..., None]:
     """A command of no public function, whose options are as `own_options.csv` has them."""
     hints = get_type_hints(command, include_extras=True)
-    command.__annotations__ = {name: _own(command.__name__, name, hint) for name, hint in hints.items()}
+    command.__annotations__ = {name: _own_annotation(command.__name__, name, hint) for name, hint in hints.items()}
     return command
 
 
-def _own(command: str, name: str, kind: Any) -> Any:
+def _own_annotation(command: str, name: str, kind: Any) -> Any:
     """Annotation of what a command takes beside the function's arguments: by `own_options.csv`, or as it is."""
     row = OWN.get((command, name))
     if row is None:
@@ -310,11 +312,11 @@ def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any
     if default is None:
         kind |= None
     elif isinstance(default, tuple):
-        default = _shown(default)
+        default = _default_as_typed(default)
     if unit is not None and metavar is not None and item.default:
         default = f"{item.default:g}{unit[1]}"
     if "." in item.path and metavar is None and item.default not in (None, ()):
-        about["show_default"] = _shown(item.default)
+        about["show_default"] = _default_as_typed(item.default)
     return Annotated[kind, typer.Option(option, metavar=METAVARS.get(item.path, metavar), **about)], default
 
 
@@ -330,7 +332,7 @@ def _value_kind(item: Declaration, metavar: str | None) -> tuple[Any, str | None
     return str, metavar
 
 
-def _shown(value: Any) -> str:
+def _default_as_typed(value: Any) -> str:
     """A default as it is typed."""
     return "x".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
@@ -371,8 +373,8 @@ def declarations(target: str) -> tuple[Declaration, ...]:
 
 
 def _declared(module: str, name: str) -> Iterator[Declaration]:
-    function = _found(module, name, ast.FunctionDef)
-    said, names = _arguments_said(ast.get_docstring(function) or ""), function.args
+    function = _import_object(module, name, ast.FunctionDef)
+    said, names = _argument_texts(ast.get_docstring(function) or ""), function.args
     positional = [*names.posonlyargs, *names.args]
     defaults = [None] * (len(positional) - len(names.defaults)) + list(names.defaults)
     for item, default in zip([*positional, *names.kwonlyargs], [*defaults, *names.kw_defaults], strict=True):
@@ -389,7 +391,7 @@ def _declared(module: str, name: str) -> Iterator[Declaration]:
 def _class_fields(module: str, table: str) -> Iterator[Declaration]:
     """Fields of an options table or dataclass with their meanings."""
     home = _home(module, table)
-    found = _found(home, table, ast.ClassDef)
+    found = _import_object(home, table, ast.ClassDef)
     texts = field_texts(found, _source(home).splitlines())
     for item in found.body:
         if isinstance(item, ast.AnnAssign) and "ClassVar" not in (annotation := ast.unparse(item.annotation)):
@@ -403,7 +405,7 @@ def _is_table(module: str, name: str) -> bool:
     return any(ast.unparse(base) == "Options" for found in bases for base in found)
 
 
-def _arguments_said(docstring: str) -> dict[str, str]:
+def _argument_texts(docstring: str) -> dict[str, str]:
     """Texts of the arguments in a docstring."""
     part = re.split(r"\n(?=\S)", docstring.partition("Args:\n")[2])[0]
     entries = re.findall(r"^    (\w+): (.*(?:\n {8,}.*)*)", part, re.MULTILINE)
@@ -421,7 +423,7 @@ def _tree(module: str) -> ast.Module:
     return ast.parse(_source(module))
 
 
-def _found(module: str, name: str, kind: type[Any]) -> Any:
+def _import_object(module: str, name: str, kind: type[Any]) -> Any:
     """A function or class of a module."""
     return next(item for item in _tree(module).body if isinstance(item, kind) and item.name == name)
 

@@ -48,7 +48,7 @@ def check_rules(command: str, states: Collection[str], given: Callable[..., list
 _V = TypeVar("_V")
 
 
-def given_options(context: typer.Context, *parameters: str) -> list[str]:
+def typed_options(context: typer.Context, *parameters: str) -> list[str]:
     """Options that were typed, in the order of `parameters`, also those with the value that they have otherwise."""
     options = {parameter.name: max(parameter.opts, key=len) for parameter in context.command.params}
     return [
@@ -60,7 +60,7 @@ def given_options(context: typer.Context, *parameters: str) -> list[str]:
 
 def refuse_conflicts(context: typer.Context, *states: str, **words: object) -> None:
     """Refuse typed options that conflict with the request, by the rules of the command."""
-    check_rules(str(context.info_name), states, partial(given_options, context), **words)
+    check_rules(str(context.info_name), states, partial(typed_options, context), **words)
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:

@@ -83,8 +83,8 @@ def simulate(
         if target is not None:
             write_dataset(dataset, target)
         look = {"panels": "main", **look}
-        with renderer.answer_kept(lambda: run_answer(dataset), json=json):
-            files, warnings = _drawn(dataset, picture, look, movie, progress, written=target is not None)
+        with renderer.answer_before_error(lambda: run_answer(dataset), json=json):
+            files, warnings = _draw_and_film(dataset, picture, look, movie, progress, written=target is not None)
     found = run_answer(dataset.assign_attrs(note_attributes([*notes_in(dataset.attrs), *warnings])))
     renderer.show(renderer.with_files(found, file=None if output is None else str(output), **files), json=json)
     if any(event["what"] == INTERRUPTED for event in found["events"]):
@@ -102,7 +102,7 @@ def check_movie(movie: Path) -> None:
         import_optional(package, "a film")
 
 
-def _drawn(
+def _draw_and_film(
     dataset: xr.Dataset, picture: Path | None, look: dict[str, str], movie: Path | None, progress: Any, *, written: bool
 ) -> tuple[dict[str, str], list[str]]:
     """Draw and film a run; the files by what they are, and the film's warnings."""

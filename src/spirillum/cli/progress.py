@@ -68,7 +68,7 @@ class StagePace:
         self.done = done
 
     @property
-    def left(self) -> float | None:
+    def time_left(self) -> float | None:
         """Time until the stage is done, s; None then, and before a second step, for the first ones start together."""
         steps = self.done - self._first
         if not self.total or self.done >= self.total or steps < min(_FEWEST, self.total - self._first):
@@ -111,7 +111,7 @@ class ProgressLines:
     def _line(self, now: float) -> str:
         pace = self._pace
         of = f" of {pace.total}" if pace.total else ""
-        left = "" if pace.left is None else f", about {duration(pace.left)} left"
+        left = "" if pace.time_left is None else f", about {duration(pace.time_left)} left"
         if not pace.what:
             return f"at work, {duration(now - self._begin)} elapsed"
         return f"{pace.what}: {pace.done}{of}, {duration(now - self._begin)} elapsed{left}"

@@ -23,7 +23,7 @@ from spirillum.cli.tables.parts import Answer, Block, Detail
 from spirillum.cli.wrapping import NARROWEST, wrapped
 from spirillum.display import counted
 from spirillum.envelope import as_json, with_notes_last
-from spirillum.notes import Note, notes_in_answer, shown_cautions
+from spirillum.notes import Note, headline_cautions, notes_in_answer
 
 
 class _PipedConsole(Console):
@@ -46,7 +46,7 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
     if console.width < NARROWEST:
         console = _PipedConsole(width=NARROWEST, emoji=False)  # a narrow terminal wraps; it must not lose numbers
     notes, every = notes_in_answer(answer), every_note.get()
-    cautions = [] if every else shown_cautions(notes)
+    cautions = [] if every else headline_cautions(notes)
     title, *blocks = blocks_of(answer, **options)
     details = [block for block in blocks if isinstance(block, Detail)]
     _print_title(console, title, cautions)
@@ -135,14 +135,14 @@ def show_with_pictures(
 ) -> None:
     """Print an answer with the pictures of its source by their entries, also where one of them cannot be drawn."""
     files: dict[str, str | None] = {}
-    with answer_kept(lambda: with_files(answer, **files), json=json, **options):
+    with answer_before_error(lambda: with_files(answer, **files), json=json, **options):
         for name, one in draw.items():
             files[name] = one(source)
     show(with_files(answer, **files), json=json, **options)
 
 
 @contextmanager
-def answer_kept(answer: Callable[[], Answer], *, json: bool, **options: Any) -> Iterator[None]:
+def answer_before_error(answer: Callable[[], Answer], *, json: bool, **options: Any) -> Iterator[None]:
     """Print an answer that was computed before the error of the block that writes its files."""
     try:
         yield
@@ -244,7 +244,7 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
 
         def render(self, _task: object) -> Text:
             """Return the text of the column."""
-            return Text("" if pace.left is None else f"about {duration(pace.left)} left")
+            return Text("" if pace.time_left is None else f"about {duration(pace.time_left)} left")
 
     columns = (
         TextColumn("{task.description}"),

@@ -112,7 +112,7 @@ def flow(
     Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
     """
     from spirillum.cli import renderer
-    from spirillum.fields.flow import flow_answer, seat_in_tube
+    from spirillum.fields.flow import find_tube_pose, flow_answer
     from spirillum.fields.grid import box_around, plane_around
     from spirillum.files import guard_inputs
     from spirillum.fluid.tube.domain import pose_of
@@ -129,7 +129,7 @@ def flow(
             problem = "no robot" if request.named_robot is None else f"time = {time} without a run"
             raise InputError(f"{problem}; allowed: a preset's name or a robot file, or --run RUN.nc --time TIME")
         loaded = request.robot
-        seat = seat_in_tube(loaded, model, request.arguments.get("placement"), fineness)
+        seat = find_tube_pose(loaded, model, request.arguments.get("placement"), fineness)
     else:
         from spirillum.dynamics.flow_of_run import flow_of_run, moment_of_run
 

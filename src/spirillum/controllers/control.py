@@ -190,7 +190,7 @@ class Control(DisplayMixin):
         }
         return envelope("control", content, self.warnings)
 
-    def _shown(self) -> tuple[dict[str, Any], None]:
+    def _display_content(self) -> tuple[dict[str, Any], None]:
         """See `DisplayMixin`: the task's error first, then every controller's scores."""
         answer = self.to_dict()
         error, scores = answer.pop("error"), answer.pop("scores") or {}

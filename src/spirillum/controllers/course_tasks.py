@@ -215,7 +215,7 @@ class HoldSpeedTask(_CourseTask):
         time, place = run.time, run.position[:, 0]
         starts = np.arange(0.5 * brief.duration, brief.duration - _SPEED_OVER, 0.25)
         ways = np.interp(starts + _SPEED_OVER, time, place) - np.interp(starts, time, place)
-        return float(np.median(brief.way * ways / _SPEED_OVER)) - self.set_speed
+        return float(np.median(brief.direction * ways / _SPEED_OVER)) - self.set_speed
 
     def _is_good(self, error: float) -> bool:
         return abs(error) <= _WITHIN * self.set_speed
@@ -237,7 +237,7 @@ class RideOutTask(_CourseTask):
     def _error(self, run: LoopRun, brief: Brief) -> float:
         time, place = run.time, run.position[:, 0]
         travelled = float(np.interp(brief.duration, time, place) - place[0])
-        return brief.way * travelled - self.set_speed * brief.duration
+        return brief.direction * travelled - self.set_speed * brief.duration
 
     def _is_good(self, error: float) -> bool:
         return abs(error) <= self.tolerance

@@ -126,7 +126,7 @@ class StopAtTask(Task):
         if name == FEEDBACK:
             return StopController(brief.lab, brief.speed, brief.duty, self.goal, self.tolerance)
         if name == "knowing":
-            return KnowingStop(brief.lab, brief.duty, self.goal, brief.way, flow, brief.carried)
+            return KnowingStop(brief.lab, brief.duty, self.goal, brief.direction, flow, brief.carried)
         return Timed(brief.lab, brief.schedule[0] if name == "open-loop" else 0.0, brief.duty)
 
     def _error(self, run: LoopRun, brief: Brief) -> float:  # noqa: ARG002 - one interface for all tasks

@@ -48,7 +48,7 @@ class Brief:
     carried: float  #: Displacement of the robot over that of the mean flow that carries it.
 
     @property
-    def way(self) -> float:
+    def direction(self) -> float:
         """1 or -1, along which the robot swims."""
         return float(np.sign(self.speed))
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Flags, Samples
 from spirillum.designs.criteria import Judged, Manufacturability, Space, condition_of, quantity_of, space_of, with_unit
-from spirillum.designs.design_result import Alternative, Design, Uncertainty, bound_by_of, lead_warnings, profile_of
+from spirillum.designs.design_result import Alternative, Design, Uncertainty, bound_by_of, margin_warnings, profile_of
 from spirillum.designs.evaluation import Evaluation, Objective, SampledRobots, Unknowns, unknowns_of
 from spirillum.designs.learned import chosen_model, is_learned, learned_best
 from spirillum.designs.search import CONFIRMED, Archive, best_apart, best_design, confirmed, pareto_front
@@ -27,7 +27,7 @@ from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.cautions import calibration_warnings, drive_warnings
 from spirillum.swimming.model_choice import AUTO, WALLED
 from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
-from spirillum.swimming.steady import LEVEL, STEADY, Swimming, friction_reading
+from spirillum.swimming.steady import LEVEL, STEADY, Swimming, find_friction_model
 from spirillum.units import KINDS, parse_option, show
 
 _MORE_DRAWS = 4  # draws of what is stated over those of the search
@@ -129,7 +129,7 @@ def design(
         answer = replace(answer, confirmed=confirmed(built, make_tables=options.confirm, progress=progress))
     elif options.confirm:
         raise InputError("confirm = True, but trials follow from the drive in the tube; allowed: model 'tube' alone")
-    return replace(answer, warnings=(*answer.warnings, *lead_warnings(answer)))
+    return replace(answer, warnings=(*answer.warnings, *margin_warnings(answer)))
 
 
 def _objectives(maximise: str | Sequence[str], minimise: str | Sequence[str], options: Judged) -> tuple[Objective, ...]:
@@ -322,7 +322,7 @@ def _warnings(
         found.append(Note.named("designs-without-walls"))
     if stated.model.name in known.calibration:
         found += calibration_warnings(built, stated.model.name)
-    reading = friction_reading(given.friction.reading)
+    reading = find_friction_model(given.friction.reading)
     if not {"friction.effective", "friction", "shared_friction"} & set(stated.samples.values):
         found += drive_warnings(known, stated.model, reading, motion, stated.tail_rate)
     found += unknowns.fit.answer_warnings(known, stated.model, reading, stated.tail_rate)

@@ -295,7 +295,7 @@ ALTERNATIVES = {
 _SHORT = {"today": "today's design", "runner_up": "the runner-up"}
 
 
-def lead_warnings(answer: Design) -> tuple[Note, ...]:
+def margin_warnings(answer: Design) -> tuple[Note, ...]:
     """Notes on fields without influence, on a better design, and on leads below the error of the objective."""
     notes = _without_effect(answer)
     if len(notes) == len(answer.profiles):  # every design is the best one

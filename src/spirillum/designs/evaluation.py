@@ -72,7 +72,7 @@ def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int)
     values = posterior.of(robot, rng)
     size = next(iter(values.values())).size
     rows = rng.permutation(size)[:count]
-    robots = posterior.drawn(robot, size, np.random.default_rng(seed))
+    robots = posterior.sampled_robots(robot, size, np.random.default_rng(seed))
     groups = batches([robots[row] for row in rows])
     if len(groups) != 1:
         raise InputError(

@@ -21,7 +21,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.designs.criteria import TURNS, Space, Variable
 from spirillum.designs.design_result import Learned
 from spirillum.designs.evaluation import Evaluation, Unknowns
-from spirillum.designs.search import Archive, Found, best_design
+from spirillum.designs.search import Archive, SearchResult, best_design
 from spirillum.errors import InputError
 from spirillum.fluid.closed.sbt import Sbt
 from spirillum.fluid.model import SwimmerModel
@@ -201,17 +201,17 @@ def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
     """
     if model.closed_form:
         return False
-    own, strange = _own_fields(space)
+    own, strange = _flow_fields(space)
     return model.placed or not unknowns.known or (not strange and len(own) <= _MOST_FIELDS)
 
 
 def _changing_the_flow(space: Space, unknowns: Unknowns) -> tuple[tuple[Variable, ...], list[str]]:
     """Fields that are varied and change the flow; names of those, varied or unknown, of which it cannot be learned."""
-    own, strange = _own_fields(space)
+    own, strange = _flow_fields(space)
     return own, strange + [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
 
 
-def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
+def _flow_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
     """Fields that are varied and change the flow; names of those of which it cannot be learned."""
     own = tuple(item for item in space.variables if not item.path.startswith(_FREE))
     return own, [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
@@ -257,7 +257,7 @@ Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 
 def learned_best(
     blank: Evaluation, unknowns: Unknowns, name: str, seed: int, progress: Progress | None, solve: Solve | None = None
-) -> tuple[Evaluation, Archive, Found, Learned]:
+) -> tuple[Evaluation, Archive, SearchResult, Learned]:
     """Designs with the learned model, all that the last search has evaluated, the best, and how well it is known."""
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
@@ -275,7 +275,12 @@ def learned_best(
         points = _solved(empty, np.stack(more), own, solving, progress, points)
         after = _objective(replace(blank, model=Corrected(name, points)), best.shares)
         last = abs(before / after - 1.0) if after else abs(before - after)
-    return evaluation, archive, best, Learned(len(points.features), last, _left_out(evaluation, name, points))
+    return (
+        evaluation,
+        archive,
+        best,
+        Learned(len(points.features), last, _cross_validation_error(evaluation, name, points)),
+    )
 
 
 def _objective(evaluation: Evaluation, shares: Samples) -> float:
@@ -340,7 +345,7 @@ def _runner_up(evaluation: Evaluation, archive: Archive, best: Samples, number: 
     return [shares[first]] if np.isfinite(worth[first]) else []
 
 
-def _left_out(evaluation: Evaluation, name: str, points: Points) -> float:
+def _cross_validation_error(evaluation: Evaluation, name: str, points: Points) -> float:
     """Error of the objective where a solved design is learned from the others, of the better half of them."""
     space = evaluation.space
     chosen = [n for n, item in enumerate(space.variables) if item in points.variables]

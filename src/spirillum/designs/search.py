@@ -60,7 +60,7 @@ class Archive:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """The end of one search."""
 
     shares: Samples  #: The best design, (variables,).
@@ -77,7 +77,7 @@ def best_design(
     above: tuple[int, float] | None = None,
     start: Samples | None = None,
     progress: Progress | None = None,
-) -> Found:
+) -> SearchResult:
     """Minimise the cost of one objective."""
     from scipy.optimize import Bounds, differential_evolution, minimize
 
@@ -143,7 +143,7 @@ def best_design(
             best = best.copy()
             best[free], cost = np.clip(refined.x, 0.0, 1.0), float(refined.fun)
     final = evaluation.scores(best[None])
-    return Found(best, cost, bool(np.isfinite(final.values[objective, 0])))
+    return SearchResult(best, cost, bool(np.isfinite(final.values[objective, 0])))
 
 
 def pareto_front(

@@ -105,7 +105,7 @@ def posterior_numbers(axial: AxialRobot, posterior: str | Path, count: int) -> S
             f"{posterior} was fitted to poses in the tube, each of which is a flow of its own; allowed: one of drag "
             "factors and friction, or ranges"
         )
-    drawn = known.drawn(axial.robot, count, np.random.default_rng(1))
+    drawn = known.sampled_robots(axial.robot, count, np.random.default_rng(1))
     numbers = np.tile(np.array(axial.values), (len(drawn), 1))
     for rows, batch in batches(drawn):
         own = np.full(batch.size, steady.effective_friction)

@@ -205,7 +205,7 @@ def axial_robot(
         friction=friction,
         calibrated=calibrated,
         fit=read_fit(calibration),
-        placement=placed if placed.is_given else None,
+        placement=placed if placed.is_set else None,
         band=False,
     )
     return AxialRobot.of(steady)

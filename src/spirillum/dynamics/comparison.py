@@ -28,10 +28,10 @@ from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.model_choice import UNBOUNDED, WALLED
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.steady import STEADY, friction_reading, headline, swim
+from spirillum.swimming.steady import STEADY, find_friction_model, headline, swim
 
 LIGHTHILL = "sbt"  #: The theory from which the effects are counted.
 
@@ -117,7 +117,7 @@ class ModelComparison(DisplayMixin):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 
     robot: Robot
-    friction: FrictionReading  #: Friction model, the same for all models.
+    friction: FrictionModel  #: Friction model, the same for all models.
     models: tuple[str, ...]  #: Names of the models, in the order of the question.
     predictions: Mapping[str, Prediction]  #: Answers by model, in that order.
     refusals: Mapping[str, str]  #: Why a model does not answer, a sentence each.
@@ -185,7 +185,7 @@ class ModelComparison(DisplayMixin):
         }
         return envelope("model-comparison", content, self.warnings)
 
-    def _shown(self) -> tuple[dict[str, Any], None]:
+    def _display_content(self) -> tuple[dict[str, Any], None]:
         """See `DisplayMixin`: the quantities that matter most, model by model."""
         answer = self.to_dict()
         models = [item for item in answer["models"] if item["answered"]]
@@ -274,7 +274,7 @@ def compare_models(
     factors = calibration is not None if calibrated is None else calibrated
     fit = read_fit(calibration)
     ready = fit.central(own)
-    reading = friction_reading(ready.friction.reading if friction is None else friction)
+    reading = find_friction_model(ready.friction.reading if friction is None else friction)
     pose = Placement.of(placement)
     check_placement(pose, *(find_swimmer_model(name) for name in names))
     trial = TrialRequest(
@@ -307,7 +307,9 @@ def compare_models(
                 band=False,
                 progress=progress,
             )
-            predictions[name] = trial.beside(held, wanted=True) if find_swimmer_model(name).placed else held
+            predictions[name] = (
+                trial.add_released_motions(held, wanted=True) if find_swimmer_model(name).placed else held
+            )
         except InputError as error:
             refusals[name] = str(error)
     if not predictions:

@@ -25,10 +25,10 @@ from spirillum.progress import Progress, tell
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
-from spirillum.swimming.drawn_resistance import PosteriorFor, sampled_discrepancy
 from spirillum.swimming.intervals import intervals_over, sampled_batch
 from spirillum.swimming.model_choice import ModelChoice, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
+from spirillum.swimming.sampled_resistance import PosteriorFor, sampled_discrepancy
 from spirillum.swimming.steady import LEVEL, Intervals, Swimming
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def with_intervals(
     """A run with 95 % intervals of its mean speed and rates, as scalars `..._low` and `..._high`."""
     rng = np.random.default_rng(1)
     found: dict[str, list[float]] = {f"mean_{name}{over}": [] for name in _FACTORS for over in _OVER}
-    drawn, kept = posterior.drawn(robot, draws, rng), posterior.places(draws)
+    drawn, kept = posterior.sampled_robots(robot, draws, rng), posterior.places(draws)
     for number, one in enumerate(drawn):
         tell(progress, "draws of the posterior", number, len(drawn))
         answer = run(one, kept[number])
@@ -160,7 +160,7 @@ def intervals_of_free_motion(
     rng, indices = np.random.default_rng(1), posterior.places(DRAWS)
     swum: list[Swimming] = []
     steady = []
-    for number, (index, one) in enumerate(zip(indices, posterior.drawn(unbound, DRAWS, rng), strict=True)):
+    for number, (index, one) in enumerate(zip(indices, posterior.sampled_robots(unbound, DRAWS, rng), strict=True)):
         tell(progress, "draws of the posterior", number, len(indices))
         release = found.release.with_contact(posterior.contact(index))
         held, links = prepare_release(one, found.robot.table, release, found.prediction.tail_rate, reading)

@@ -24,7 +24,7 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import check_domain, least_gap
-from spirillum.swimming.steady import STEADY, Swimming, friction_reading, requirements
+from spirillum.swimming.steady import STEADY, Swimming, find_friction_model, requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     drawn = max(gap, _THINNEST * robot.body.diameter)
     requested = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
     try:
-        friction = friction_reading(str(now.attrs.get("friction", robot.friction.reading)))
+        friction = find_friction_model(str(now.attrs.get("friction", robot.friction.reading)))
         batch = RobotBatch.of(robot, Placement.of(requested))
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))

@@ -36,7 +36,7 @@ from spirillum.robot.links import links_of
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.outline import profile_outline
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.drives import packed_curve
 from spirillum.swimming.released_motion import LINKS
@@ -200,7 +200,7 @@ class FreeRobot(ABC):
         """The robot with what of an imposed flow matters from one time to another, s."""
         return self
 
-    def range_left(self, state: Samples, time: float) -> str:
+    def range_message(self, state: Samples, time: float) -> str:
         """A sentence on the range of the table that was left."""
         raise NotImplementedError  # no table, no range
 
@@ -221,7 +221,7 @@ class FreeRobot(ABC):
         return found
 
 
-def friction_of(batch: RobotBatch, reading: FrictionReading, effective: float) -> Samples:
+def friction_of(batch: RobotBatch, reading: FrictionModel, effective: float) -> Samples:
     """The readings of (18) and (19) as torques against Omega_b about x (on the whole) and omega_m (in the joint)."""
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     t = friction_torques(reading, np.array([effective]), rotor)
@@ -318,7 +318,7 @@ def two_links(
     batch: RobotBatch,
     model: SwimmerModel,
     *,
-    friction: FrictionReading,
+    friction: FrictionModel,
     effective: float,
     calibrated: bool,
     weight: bool,

@@ -268,7 +268,7 @@ def _crossed(
         elif index == sites + core.ROOM:
             what = END_OF_CHANNEL
         else:
-            what = robot.range_left(inner, moment)
+            what = robot.range_message(inner, moment)
         run.state[:] = inner
         run.memory[core.MEMORY_TIME] = moment
         run.memory[core.MEMORY_STEP] = step

@@ -18,10 +18,10 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
-from spirillum.swimming.drawn_resistance import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
-from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
+from spirillum.swimming.prediction import Prediction, interval_statement, with_posterior_medians
 from spirillum.swimming.reynolds import without_reynolds_bound
+from spirillum.swimming.sampled_resistance import posterior_for_of
 from spirillum.units import KINDS, as_given, parse_option
 
 
@@ -127,7 +127,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             progress=progress,
         )
         held = replace(held, warnings=(*held.warnings, *([FITTED_TRIAL] if of_trials else idle)))
-        return request.beside(held, wanted=motion is None)
+        return request.add_released_motions(held, wanted=motion is None)
     for name, value in (("interval", interval or None), ("duration", duration)):
         if value is not None:
             raise InputError(
@@ -159,7 +159,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     intervals = intervals_of_free_motion(found, fit.posterior, posterior_for=whose, progress=progress)
     return replace(
         answer,
-        swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
+        swimming=with_posterior_medians(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
         interval_of=interval_statement(fit.posterior, answer.robot, whose),
         warnings=(*answer.warnings, *notes, *fit.run_warnings(answer.robot, answer.model, answer.friction)),

@@ -115,7 +115,7 @@ class ReturnMap:
         if status == core.STUCK:
             return "no step is small enough to follow the motion; allowed: a larger roughness"
         if gaps[-core.WATCHED + core.WITHIN] < 0:
-            return f"{self.robot.range_left(y, time)}; allowed: another start, or motion 'held'"
+            return f"{self.robot.range_message(y, time)}; allowed: another start, or motion 'held'"
         if time > _STALLED * self.robot.turn:
             return "the tail hardly turns there; allowed: a stronger drive, or motion 'held'"
         if self.steps[0] > _MOST_STEPS:

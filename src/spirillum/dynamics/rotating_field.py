@@ -196,7 +196,7 @@ def magnetic_sweep(
     choice = ModelChoice(UNBOUNDED, NO_CHANNEL) if model == AUTO else ModelChoice(model)
     check_full(find_swimmer_model(choice.model))
     check_range("turns", turns, 4, 10_000)
-    given = None if rates is None else _given_rates(rates)
+    given = None if rates is None else _parse_rates(rates)
     own = with_resolution(loaded, resolution, choice.model)
     # The rates of the sweep decide whether there is an answer, not the robot's own.
     held = replace(predict(without_reynolds_bound(own), model=choice, calibrated=False), robot=own)
@@ -266,7 +266,7 @@ def _usual_rates(held: Prediction) -> Samples:
     return float(np.sign(held.batch.field_rate[0]) or 1.0) * np.linspace(0.0, 1.5, 41)[1:] * held.step_out_rate
 
 
-def _given_rates(rates: Sequence[str | float] | Samples) -> Samples:
+def _parse_rates(rates: Sequence[str | float] | Samples) -> Samples:
     """Rates as a caller has given them, rad/s."""
     given: Any = [rates] if isinstance(rates, str) else rates
     if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) != 1:

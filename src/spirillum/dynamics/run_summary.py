@@ -45,7 +45,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
     """Averages of a run, its final values, and what happened in it."""
     last, attrs = dataset.isel(time=-1), dataset.attrs
     content: dict[str, Any] = {
-        **_given(attrs, "robot", "model", "model_reason", "friction", "motion"),
+        **_known_attributes(attrs, "robot", "model", "model_reason", "friction", "motion"),
         "error_estimate": quantity(
             float(attrs["error_estimate"]),
             "1",
@@ -55,7 +55,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         **({"placement": json.loads(attrs["placement"])} if "placement" in attrs else {}),
         **_in_the_tube(dataset),
         "events": json.loads(attrs["events"]),
-        **_given(attrs, "state", "steady"),
+        **_known_attributes(attrs, "state", "steady"),
         "duration": quantity(float(last["time"]), "s"),
     }
     if (begins := float(dataset["time"][0])) > 0.0:
@@ -76,7 +76,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
     return envelope("simulation", content, notes_in(dataset.attrs))
 
 
-def _given(attrs: Mapping[str, Any], *names: str) -> dict[str, Any]:
+def _known_attributes(attrs: Mapping[str, Any], *names: str) -> dict[str, Any]:
     """The attributes of these names that there are."""
     return {name: attrs[name] for name in names if name in attrs}
 
@@ -90,7 +90,7 @@ def _interval(dataset: xr.Dataset, name: str) -> dict[str, Any]:
 def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:
     """Every quantity of a sweep as a list over the rates of the field."""
     content: dict[str, Any] = {
-        **_given(dataset.attrs, "robot", "model", "model_reason"),
+        **_known_attributes(dataset.attrs, "robot", "model", "model_reason"),
         "step_out_rate": quantity(float(dataset["step_out_rate"]), "rad/s"),
         "field_rate": quantity(dataset["field_rate"].values, "rad/s"),
     }

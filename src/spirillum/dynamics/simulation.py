@@ -39,7 +39,7 @@ from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
-from spirillum.swimming.steady import friction_reading, requirements
+from spirillum.swimming.steady import find_friction_model, requirements
 from spirillum.units import as_given
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     times.check()
     number = sample_count(draws, known)
     if friction is not None:
-        friction_reading(friction)
+        find_friction_model(friction)
     own = load(robot)
     central = own if known is None else known.central(own)
     contact = fit.contact()
@@ -159,7 +159,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
 
     dataset = run(central, times, progress)
     if known is not None:
-        reading = friction_reading(central.friction.reading if friction is None else friction)
+        reading = find_friction_model(central.friction.reading if friction is None else friction)
         notes += [FITTED_HELD] if walled and known.answer == "held" else []
         notes += fit.run_warnings(central, find_swimmer_model(model), reading)
     if known is not None and number:
@@ -247,10 +247,10 @@ def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *
             "'tube' with motion 'free'"
         )
     given = [
-        *(["a placement is given"] if placement.is_given else []),
+        *(["a placement is given"] if placement.is_set else []),
         *([f"roughness = {as_given(roughness, 'm')}"] if roughness is not None else []),
         *([] if weight else ["weight = False"]),
     ]
     if given:
-        or_walls = ", or model 'tube'" if placement.is_given else ""
+        or_walls = ", or model 'tube'" if placement.is_set else ""
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'{or_walls}")

@@ -41,12 +41,12 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
 from spirillum.swimming.preparation import preparation_time, table_for, why_no_table
 from spirillum.swimming.released_motion import ASSUMPTION, HELD, SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
+from spirillum.swimming.sampled_resistance import PosteriorFor
 from spirillum.swimming.steady import STEADY
 from spirillum.units import as_given, show, speed_unit
 
@@ -205,7 +205,7 @@ def samples_of_draws(
 ) -> list[TrialSample]:
     """Return the runs over draws of a posterior and over the unknowns that it leaves open."""
     kept = posterior.places(RUNS)
-    drawn = posterior.drawn(without_reynolds_bound(robot), RUNS, np.random.default_rng(1))
+    drawn = posterior.sampled_robots(without_reynolds_bound(robot), RUNS, np.random.default_rng(1))
     return [
         samples_of(drawn[number % len(kept)], weight, unknowns, own[None])[0]._replace(draw=kept[number % len(kept)])
         for number, own in enumerate(_shares(unknowns))
@@ -350,7 +350,7 @@ class TrialRequest:
         """Where and how the robot is released, without what is fitted of the contact."""
         return Release.of(self.placement, self.in_tube, self.roughness)
 
-    def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
+    def add_released_motions(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none."""
         reason = why_not_released(held.robot, held.model.name, held.tail_rate, held.batch.placement)
         if reason:

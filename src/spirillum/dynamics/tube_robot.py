@@ -92,7 +92,7 @@ class TubeRobot(FreeRobot):
         """Which part of the robot touches the wall, or leaves it."""
         return f"{self.names[site]} {'touches' if touches else 'leaves'} the wall"
 
-    def range_left(self, state: Samples, time: float) -> str:
+    def range_message(self, state: Samples, time: float) -> str:
         """A sentence on the range of the table that was left."""
         seen = self.observe(np.array([time]), state[None])[0]
         name = _RANGES.get(int(seen[core.SEEN_OUTSIDE]), "place")

@@ -75,7 +75,7 @@ def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
     if pairs["ends"] == (ENDS[core.IMPOSED],) * 2:
         pairs["mean flow at its end"] = (float(numbers_of(before, "mean_flow")[-1]), flow)
     for what, (then, now) in pairs.items():
-        if not _alike(then, now):
+        if not _equal_values(then, now):
             return f"{what} {_said(then)}, and not {_said(now)}"
     fields = _other_fields(robot_of(before).model_dump(), steady.robot.model_dump())
     return f"another {fields[0]}" if fields else ""
@@ -99,7 +99,7 @@ def _switched_otherwise(before: xr.Dataset, switches: Sequence[Switch]) -> str:
     return f"duty {then[first]:.4g} at {times[first]:.4g} s, and not {now[first]:.4g}"
 
 
-def _alike(then: Any, now: Any) -> bool:
+def _equal_values(then: Any, now: Any) -> bool:
     """Whether two values are the same, numbers to rounding."""
     if isinstance(then, float) and isinstance(now, float):
         return bool(np.isclose(then, now, rtol=1e-9, atol=1e-15, equal_nan=True))
@@ -117,7 +117,7 @@ def _other_fields(then: Mapping[str, Any], now: Mapping[str, Any], prefix: str =
         old = then.get(name)
         if isinstance(value, Mapping) and isinstance(old, Mapping):
             found += _other_fields(old, value, f"{prefix}{name}.")
-        elif not _alike(old, value):
+        elif not _equal_values(old, value):
             found.append(f"{prefix}{name}")
     return found
 

@@ -27,7 +27,7 @@ from spirillum.files import MARK, atomic_write, guard_inputs, output_target
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import Robot
-from spirillum.version import own_version
+from spirillum.version import package_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,7 +203,7 @@ class _Writer:
         from mcap.writer import Writer
 
         self._writer = Writer(stream)
-        self._writer.start(library=f"{MARK} {own_version()}")
+        self._writer.start(library=f"{MARK} {package_version()}")
         numbers = {name: {**_NUMBER, "description": text} for name, text in _meanings(dataset).items()}
         self._schemas = {
             **SCHEMAS,

@@ -72,7 +72,7 @@ class Flow(DisplayMixin):
     @property
     def seat(self) -> TubePose | None:
         """The tube and the robot's pose in it; None for unbounded fluid."""
-        return _seat(self.prediction)
+        return _tube_pose(self.prediction)
 
     @property
     def heading(self) -> Samples:
@@ -268,7 +268,7 @@ def _choice(model: str, robot: Robot, placement: Placement | Mapping[str, Any] |
 
 def _field(prediction: Prediction, phase: float) -> FluidField:
     """The flow of the predicted motion."""
-    seat = _seat(prediction)
+    seat = _tube_pose(prediction)
     forward = prediction.forward_velocity * (np.array([1.0, 0.0, 0.0]) if seat is None else seat.forward)
     body, rotor = (
         np.concatenate([forward, [rate, 0.0, 0.0]])
@@ -279,11 +279,11 @@ def _field(prediction: Prediction, phase: float) -> FluidField:
     return tube_flow_field(prediction.batch, body, rotor, phase, prediction.plug_velocity)
 
 
-def _seat(prediction: Prediction) -> TubePose | None:
+def _tube_pose(prediction: Prediction) -> TubePose | None:
     return pose_of(prediction.batch) if prediction.model.name == "tube" else None
 
 
-def seat_in_tube(
+def find_tube_pose(
     robot: Robot,
     model: str,
     placement: Placement | Mapping[str, Any] | None = None,

@@ -19,10 +19,10 @@ import numpy as np
 from spirillum.arrays import Amplitudes, Samples
 from spirillum.errors import InputError
 from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
-from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
+from spirillum.fluid.tube.confined import Strengths, UnitMotions, turned_motions
 from spirillum.fluid.tube.domain import pose_of
 from spirillum.fluid.tube.solids import Solids
-from spirillum.fluid.tube.tube import held_robot
+from spirillum.fluid.tube.tube import unit_motions
 from spirillum.fluid.tube.wall import waves_between
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
@@ -44,7 +44,7 @@ class TubeFlowField(FluidField):
     The pressure is that above the mean of both ends of a tube in whose middle the body lies.
     """
 
-    held: Held = field(repr=False)  #: Tractions for unit motions, at this phase, viscosity 1.
+    held: UnitMotions = field(repr=False)  #: Tractions for unit motions, at this phase, viscosity 1.
     seat: TubePose  #: The tube and the robot's pose in it.
     solids: tuple[tuple[str, Outline], ...]
     twists: Samples  #: Velocity and rotation of body, then of rotor, (12,).
@@ -294,7 +294,7 @@ def tube_flow_field(
 ) -> TubeFlowField:
     """Flow around one robot in its tube whose parts move with given twists, as in `flow_field`, in a mean flow, m/s."""
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
-    held = held_robot(batch, 0, phase)
+    held = unit_motions(batch, 0, phase)
     solids = tuple(RobotGeometry.of(batch).outlines.items())
     if not solids:
         raise InputError("the flow around a bare tail in a tube is not computed; allowed: model slender, or a body")

@@ -21,7 +21,7 @@ from spirillum.files.writing import (
     check_replaceable,
     claim_folder,
     guard_inputs,
-    holds_own_only,
+    holds_only_own_files,
     netcdf_target,
     new_file,
     output_folder,

@@ -167,7 +167,7 @@ def _named(temporary: Mapping[Path, Path]) -> Iterator[None]:
         raise OSError(error.errno, error.strerror, str((known or begun or list(temporary))[-1])) from error
 
 
-def holds_own_only(folder: Path) -> bool:
+def holds_only_own_files(folder: Path) -> bool:
     """Whether all that a folder holds are files of this program, or nothing."""
     return all(
         path.is_file() and not path.is_symlink() and path.stat().st_size > 0 and written_by_us(path)
@@ -187,7 +187,7 @@ def atomic_folder(path: Path) -> Iterator[Path]:
             yield part
             for made in part.iterdir():
                 _finish(made, sync=True)
-            if path.is_dir() and not path.is_symlink() and holds_own_only(path):
+            if path.is_dir() and not path.is_symlink() and holds_only_own_files(path):
                 path.rename(hidden / f"{path.name}.before")
             elif path.exists() or path.is_symlink():
                 raise FileExistsError(errno.EEXIST, "something of this name is there", str(path))

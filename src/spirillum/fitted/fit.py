@@ -106,7 +106,7 @@ class Fit:
         """Name of the file whose values act on a robot's answer with a model; empty where none does."""
         return self._file_name if self.serves(robot, model, friction=friction) else ""
 
-    def idle_warnings(
+    def unused_model_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
     ) -> list[Note]:
         """Models to which nothing of a calibration file applies."""
@@ -214,7 +214,7 @@ class Fit:
     def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[Note]:
         """All notes beside a steady motion."""
         acts = friction_acts(reading, rate)
-        idle = self.idle_warnings([robot], [model], friction=acts)
+        idle = self.unused_model_warnings([robot], [model], friction=acts)
         if rate is None:
             return [*idle, *self.run_warnings(robot, model, reading)]
         there = self.geometry_warnings([robot], [model])
@@ -319,10 +319,10 @@ def check_not_replaced(
     asked = tuple(fields)
     for paths in ((calibration, None), (None, posterior)):
         if asked and any(paths):
-            check_kept(asked, robot, read_fit(*paths, answer=None).central(robot), str(paths[0] or paths[1]))
+            check_not_overridden(asked, robot, read_fit(*paths, answer=None).central(robot), str(paths[0] or paths[1]))
 
 
-def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:
+def check_not_overridden(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:
     """Refuse set fields that are not the same in a robot before and after fitted values have replaced its own."""
     asked = tuple(fields)
     if not asked or after is before:

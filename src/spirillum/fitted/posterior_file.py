@@ -216,7 +216,7 @@ class PosteriorFile:
         middle = {name: float(self._column(name, channel, self.middle)) for name in self.draws}
         return self._at(middle, robot, self.frictions)
 
-    def drawn(self, robot: Robot, count: int, rng: np.random.Generator) -> list[Robot]:
+    def sampled_robots(self, robot: Robot, count: int, rng: np.random.Generator) -> list[Robot]:
         """The robot with the values of some draws in place of its own, evenly spaced among them."""
         draws = self.of(robot, rng)
         return [self._at({name: float(values[n]) for name, values in draws.items()}, robot) for n in self.places(count)]

@@ -43,7 +43,7 @@ class ResistanceModel(ABC):
         """Neglected effects with these options, and their cost."""
         return self.known_error
 
-    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
+    def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """Neglected effects for a robot, and their cost."""
         return self.stated_error(batch.options)
 

@@ -92,12 +92,12 @@ def speed_note(model: str) -> str:
     )
 
 
-def what_is_fitted(fitted_by: str) -> str:
+def fit_clause(fitted_by: str) -> str:
     """Clause on the fitted part of a result."""
     return f"what {fitted_by} has fitted is taken from it" if fitted_by else "nothing is fitted"
 
 
-def walls_left_out(batch: RobotBatch) -> str:
+def wall_clause(batch: RobotBatch) -> str:
     """Clause on neglected walls of a robot's channel, after a semicolon; empty without a channel."""
     return "; the walls of its channel are not computed" if math.isfinite(float(batch.channel_diameter[0])) else ""
 

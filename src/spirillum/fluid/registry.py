@@ -54,7 +54,7 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
 
 def check_placement(placement: Placement, *models: ResistanceModel) -> None:
     """Refuse a placement in the channel that none of the models uses."""
-    if not placement.is_given or any(model.placed for model in models):
+    if not placement.is_set or any(model.placed for model in models):
         return
     unset = type(placement)()
     given = next(item for item in field_values(placement) if item.value != getattr(unset, item.path))

@@ -33,7 +33,7 @@ from spirillum.kernels import core
 from spirillum.kernels.core import AXIAL_STATE_SIZE as AXIAL_STATES
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.prediction import Prediction
-from spirillum.version import own_version
+from spirillum.version import package_version
 
 _DERIVED: Mapping[str, Mapping[str, int]] = {
     "kg": {"kg": 1},
@@ -254,7 +254,7 @@ def description_text(model: FmuModel, token: str) -> str:
             f"{prediction.robot.name}, {model.motion}: model {prediction.model.name}, friction "
             f"{prediction.friction}, {fitted_words(prediction.calibrated, prediction.fitted_by)}"
         ),
-        tool=f"spirillum {own_version()}",
+        tool=f"spirillum {package_version()}",
         units={item.unit: base_units(item.unit) for *_, item in variables if item.unit},
         variables=variables,
     )

@@ -40,7 +40,7 @@ def shape_of(film: Samples) -> tuple[int, int, int, int]:
     return int(film[FILM_INTERVALS]) + 3, int(film[FILM_SECOND_INTERVALS]) + 3, int(film[FILM_YAWS]), FILM_ENTRIES
 
 
-def film_is_whole(film: Samples, radius: float) -> bool:
+def is_complete_film(film: Samples, radius: float) -> bool:
     """Whether an array is a packed film in a tube of this radius: the loops below check no index.
 
     Args:
@@ -133,7 +133,7 @@ def is_whole(table: Samples, radius: float) -> bool:
     if phases % 2.0 == 0.0 or (turned.min() < 1 and turned.max() != 0):
         return False
     start = film_start(table)
-    return start < table.size and bool(np.isfinite(table[:start]).all()) and film_is_whole(table[start:], radius)
+    return start < table.size and bool(np.isfinite(table[:start]).all()) and is_complete_film(table[start:], radius)
 
 
 class Range(NamedTuple):

@@ -26,7 +26,7 @@ from spirillum.measurement.statistics import (
 )
 from spirillum.measurement.trials import LEVEL, RATE_NAMES, Measured, Trial, trial_of
 from spirillum.robot.robot import Robot
-from spirillum.vision.camera.optics import BodyPose, places_seen_by
+from spirillum.vision.camera.optics import BodyPose, positions_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
@@ -39,7 +39,7 @@ from spirillum.vision.track.size import align_with_path, checked_scale
 from spirillum.vision.track.steadiness import StillPicture, shift_of, view_of
 from spirillum.vision.track.steps import FrameTracker
 from spirillum.vision.track.track import CUES, RobotMotion
-from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
+from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, static_object_flag, unwrapped
 from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
@@ -77,7 +77,7 @@ def motion_flags(
     of_body = unwrapped(time, roll, roll_error, period, readable=readable)[1]
     of_tail = unwrapped(time, phase, phase_error, 2.0 * np.pi, "tail")[1]
     motion = RobotMotion(time, x, body, tail)
-    odd = (*nothing_moves(motion, robot), *contradictions(motion, robot, hand))
+    odd = (*static_object_flag(motion, robot), *contradictions(motion, robot, hand))
     return (*of_body, *of_tail, *odd, *no_stripe_passes(motion, robot, readable=readable))
 
 
@@ -162,7 +162,7 @@ class Following:
     def _places(self, xy: np.ndarray) -> np.ndarray:
         """Positions in the camera's frame at the stated scale, from the middle of the picture, m, (n, 2)."""
         sight = self.learnt.sight.optics
-        return places_seen_by(sight, self.learnt.known.start.body.optics, xy) - sight.origin[:2]
+        return positions_seen_by(sight, self.learnt.known.start.body.optics, xy) - sight.origin[:2]
 
     def observed(self, frame: Frame) -> Observation:
         """What a frame shows."""

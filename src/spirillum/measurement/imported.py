@@ -19,7 +19,7 @@ from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import EDGE, Ruled
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import opened, samples_of
-from spirillum.vision.camera.optics import seen
+from spirillum.vision.camera.optics import project
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.learning import learnt_from
@@ -55,7 +55,7 @@ def read_track(
     points = _deeplabcut(path, size) if first == "scorer" else _trackpy(path, size, frame_of)
     order = np.argsort(points[0], kind="stable")
     frame = points[0][order]
-    nose, rear, centre = (ruled.shown(item[order]) for item in points[1:])
+    nose, rear, centre = (ruled.display_pixels(item[order]) for item in points[1:])
     if np.any(np.diff(frame) <= 0):
         raise InputError(f"{path}: frame {frame[1:][np.diff(frame) <= 0][0]:g} is a duplicate; allowed: once a frame")
     front, back = ruled.points(nose), ruled.points(rear)
@@ -221,7 +221,7 @@ def check_track(track: Track, table: Path, video: Path, setup: Setup, robot: Rob
     stated = np.column_stack([np.interp(time, track.time[there], middle[there, axis]) for axis in range(2)])
     half, tail = 0.5 * robot.body.length, robot.coupling.length + robot.tail.length
     axis = np.array([[half, 0.0, 0.0], [-half, 0.0, 0.0], [-half - tail, 0.0, 0.0]])
-    found = np.array([seen(axis, pose, known.start.body.optics) for _, pose in path])
+    found = np.array([project(axis, pose, known.start.body.optics) for _, pose in path])
     length = float(np.median(np.hypot(*(found[:, 0] - found[:, 1]).T)))
     off = np.array([_distance(point, ends[0], ends[2]) for point, ends in zip(stated, found, strict=True)])
     if np.median(off) > _BESIDE * length:

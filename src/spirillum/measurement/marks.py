@@ -50,7 +50,7 @@ class Ruled:
         """Width and height of the stored picture, upright, pixels."""
         return round(self.size[0] / self.stretch[0]), round(self.size[1] / self.stretch[1])
 
-    def shown(self, stored: Samples) -> Samples:
+    def display_pixels(self, stored: Samples) -> Samples:
         """Pixels (k, 2) of the shown picture by those of the stored one."""
         return np.asarray((stored + 0.5) * np.array(self.stretch) - 0.5)
 

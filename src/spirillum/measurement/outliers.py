@@ -98,7 +98,7 @@ _AHEAD = 1.5  # standard errors by which position and angles together lead. Chan
 _MOST = 4.0  # standard errors that one of them counts at most
 
 
-def without_lead(track: Track) -> Track:
+def without_codec_lag(track: Track) -> Track:
     """The track without its first frames, where the first one leads the next ones (codec lag)."""
     if track.time.size < _FEWEST or not _leads(track):
         return track

@@ -19,7 +19,7 @@ from spirillum.notes import Note
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
-from spirillum.vision.camera.optics import seen
+from spirillum.vision.camera.optics import project
 from spirillum.vision.track.constants import IDENTITY, SETUP_FREE, SIZE
 from spirillum.vision.track.setup_free_detection import SetupFreeDetection, detect_without_setup
 from spirillum.vision.track.steadiness import camera_flags
@@ -139,7 +139,7 @@ def propose_setup(
         name = _by_walls(seen_there, loaded)
     timed = not video.images or fps is not None
     rests = Path(name).resolve() if target is not None and Path(name).is_file() else None
-    stated = name if rests is None or target is None else _beside(rests, target)
+    stated = name if rests is None or target is None else _relative_to_setup(rests, target)
     findings = tuple(_findings(video, seen_there, loaded, name, apart, timed=timed, given=robot is not None))
     found = {finding.field: _toml(finding) for finding in findings if finding.field and finding.value is not None}
     if seen_there.known is not None or robot is not None:
@@ -165,7 +165,7 @@ def propose_setup(
     )
 
 
-def _beside(file: Path, target: Path) -> str:
+def _relative_to_setup(file: Path, target: Path) -> str:
     """A robot file as the setup file names it: relative to its own folder, if it is inside."""
     folder = target.resolve().parent
     return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else file.as_posix()
@@ -200,7 +200,7 @@ def _findings(
     half = 0.5 * robot.body.length
     ends = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
     pose = known.start.path[0][1]
-    rear, nose = seen(ends, pose, optics).tolist()
+    rear, nose = project(ends, pose, optics).tolist()
     long = math.dist(rear, nose)
     words = (
         f"a body {long:.0f} pixels long on {len(known.start.path)} of {len(found.frames)} frames; its tail is seen on "

@@ -156,7 +156,7 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
         "scale_sources": shares,
     }
     if film is not None:
-        content["film"], flags = _seen_in(film, setup, robot, Path(path).parent)
+        content["film"], flags = _detect_in(film, setup, robot, Path(path).parent)
         confirmed = scale_confirmed(content["film"]["apparent_body_size"], flags)
         warnings += [flag.note for flag in flags]
     return envelope("setup-check", content, [*setup_remarks(setup, confirmed=confirmed), *warnings])
@@ -202,7 +202,7 @@ def _as_in_example(setup: Setup) -> list[str]:
     ]
 
 
-def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
+def _detect_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
     """Findings of the initial detection with a setup, and its cautions."""
     video = opened(film, setup)
     frames = samples_of(video, setup.start, setup.end)

@@ -83,7 +83,7 @@ class ShownNumber(NamedTuple):
     unit: str  #: Unit of all three; empty where there is no value.
 
 
-def shown(value: float | None, low: float | None, high: float | None, unit: str) -> ShownNumber:
+def rounded_with_ends(value: float | None, low: float | None, high: float | None, unit: str) -> ShownNumber:
     """A number, SI, down to the second digit of its interval's half width, or in four digits, and the ends likewise."""
     if value is None or not math.isfinite(value):
         return ShownNumber("-", "-", "-", "")

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.envelope import quantity
 from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, elongation_of, flags_of
-from spirillum.measurement.outliers import outlying_frames, without_lead
+from spirillum.measurement.outliers import outlying_frames, without_codec_lag
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 from spirillum.measurement.statistics import (
     AMPLITUDE_ERROR,
@@ -169,7 +169,7 @@ def _with_interval(item: Measured) -> Measured:
 
 def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate]:
     """Fitted lines, without the first frames of a compressed video that are ahead, unless the robot slows there."""
-    shorter = track if read is not None else without_lead(track)
+    shorter = track if read is not None else without_codec_lag(track)
     fits = _fits_of(shorter, robot, read)
     if shorter is track or all(rate.steady for rate in fits.values()):
         return fits

@@ -14,7 +14,7 @@ from spirillum.pages.knobs import Settings
 from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.robot_data import quantity_list
 from spirillum.robot.robot import robot_text
-from spirillum.version import own_version
+from spirillum.version import package_version
 
 MODULES = ("format.js", "matrix.js", "renderer.js", "layers.js", "stage.js", "section.js", "plots.js", "replay.js")
 """Modules that a replay needs, each after those that it imports."""
@@ -29,7 +29,7 @@ def asset(name: str) -> str:
 
 def robot_file(swimmer: PageRobot) -> str:
     """Text of a robot file of the current robot."""
-    return robot_text(swimmer.predicted(), f"From the page of spirillum {own_version()}.")
+    return robot_text(swimmer.predicted(), f"From the page of spirillum {package_version()}.")
 
 
 def command_line(swimmer: PageRobot) -> str:

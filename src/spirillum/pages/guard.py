@@ -95,7 +95,7 @@ class Guard:
         if not self._loopback:
             self._names.add(socket.gethostname().lower())
 
-    def own_host(self, host: str) -> bool:
+    def is_own_host(self, host: str) -> bool:
         """Whether a `Host` header names this server: by its port, and an address or a name that is its own."""
         name, colon, port = host.rpartition(":")
         if not colon or port != str(self._port):

@@ -135,16 +135,16 @@ class Settings:
             return replace(self, run=kept)
         return replace(self, overrides={**self.overrides, name: value})
 
-    def shown(self, robot: Robot) -> list[dict[str, Any]]:
+    def knob_data(self, robot: Robot) -> list[dict[str, Any]]:
         """The knobs of this robot with their values, in their units."""
         return [
-            _shown(knob, self, robot)
+            _knob_data(knob, self, robot)
             for knob in KNOBS
             if not (knob.needs and getattr(robot, knob.needs) is None) and robot.source_of(knob.field) is None
         ]
 
 
-def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
+def _knob_data(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
     names = ("field", "label", "group", "unit", "note", "logarithmic", "unset")
     changed = knob.field in settings.overrides or knob.field.removeprefix("run.") in settings.run
     found: dict[str, Any] = {name: getattr(knob, name) for name in names}

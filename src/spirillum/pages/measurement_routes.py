@@ -42,7 +42,7 @@ class _Endpoints:
             "look": lambda message: session.editor.look(text_of(message, "film", "")),
             "propose": lambda message: session.editor.propose(text_of(message, "film", "")),
             "measure": lambda _message: session.measure(),
-            "beside": lambda message: session.beside(text_of(message, "trial", "")),
+            "beside": lambda message: session.compare_with_run(text_of(message, "trial", "")),
             "calibrate": lambda message: session.calibrate(
                 text_of(message, "model", ""), text_of(message, "method", "")
             ),
@@ -100,7 +100,7 @@ class _Endpoints:
         if name in texts:
             text = await run_in_background(texts[name])
             return Response(text, media_type="text/plain", headers=_attached(name))
-        path = self._session.kept(name)
+        path = self._session.result_file(name)
         if path is None:
             raise InputError(f"file {name[:60]!r}; allowed: one of the results")
         kind = _SHOWN.get(path.suffix[1:])

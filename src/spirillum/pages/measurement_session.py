@@ -143,7 +143,7 @@ class SetupEditor:
         if what == "body":
             side = nose_side(one, other)
             self._put("robot.direction", side)
-            return f"the nose points to the {side}{self._size_seen(name, one, other)}"
+            return f"the nose points to the {side}{self._clicked_size_ratio(name, one, other)}"
         if what != "ruler":
             raise InputError(f"what = {what[:20]!r}; allowed: ruler, body, stripes")
         return self._ruled(name, one, other, parse_option("length", length, KINDS["length"]))
@@ -211,7 +211,7 @@ class SetupEditor:
         still = self._still(name)
         return lines_in(still, (0, 0, still.shape[1], still.shape[0]))
 
-    def _size_seen(self, name: str, nose: tuple[float, float], rear: tuple[float, float]) -> str:
+    def _clicked_size_ratio(self, name: str, nose: tuple[float, float], rear: tuple[float, float]) -> str:
         """Clicked length of the body over that of its file, if the setup is complete and the ratio is far from 1."""
         if self.checked()["problems"]:
             return ""
@@ -293,10 +293,10 @@ class MeasurementSession:
                 raise InputError(problems[0])
             self._start("measure", {"films": films, "setup": str(self.editor.written())})
 
-    def beside(self, name: str) -> dict[str, Any]:
+    def compare_with_run(self, name: str) -> dict[str, Any]:
         """A measured trial beside the simulated robot; see `spirillum.pages.replay`."""
         from spirillum.dynamics.run_file import open_run
-        from spirillum.pages.replay import trial_beside_its_run
+        from spirillum.pages.replay import trial_with_run
 
         with self._lock:
             trials = self._results.get("measure", {}).get("trials", [])
@@ -304,7 +304,7 @@ class MeasurementSession:
         if name not in [trial["name"] for trial in trials]:
             raise InputError(f"trial {name[:40]!r}; allowed: one that was measured")
         with plain_names(self._folder):
-            return trial_beside_its_run(open_run(folder / f"{name}.nc"), f"{name}.annotated.mp4")
+            return trial_with_run(open_run(folder / f"{name}.nc"), f"{name}.annotated.mp4")
 
     def calibrate(self, model: str, method: str) -> None:
         """Begin to calibrate with what was measured."""
@@ -366,7 +366,7 @@ class MeasurementSession:
             return {"kind": self._kind, "failed": plain(str(said.get("failed", "it was left off")), self._folder)}
         return {"kind": self._kind, **{key: said.get(key) for key in ("what", "done_places", "places")}}
 
-    def kept(self, name: str) -> Path | None:
+    def result_file(self, name: str) -> Path | None:
         """A file of the results by its name; None if there is none of that name."""
         with self._lock:
             for kind, found in self._results.items():

@@ -10,7 +10,7 @@ from spirillum.pages.job import worker
 from spirillum.progress import Progress
 
 
-def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
+def measurement_data(answer: Mapping[str, Any]) -> dict[str, Any]:
     """A measurement as the page shows it: rows of quantities with their interval, as texts and in SI."""
     from spirillum.measurement.trials import MEASURED, RATE_NAMES
 
@@ -39,9 +39,9 @@ def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _row(label: str, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
-    from spirillum.measurement.statistics import shown
+    from spirillum.measurement.statistics import rounded_with_ends
 
-    seen = shown(item["value"], item.get("low"), item.get("high"), item["unit"])
+    seen = rounded_with_ends(item["value"], item.get("low"), item.get("high"), item["unit"])
     return {
         "name": name,
         "label": label,
@@ -81,9 +81,7 @@ def _work(request: dict[str, Any], progress: Progress) -> dict[str, Any]:
         }
     from spirillum.results.measurement import measure
 
-    return {
-        "shown": measurement_shown(measure(request["films"], request["setup"], output, progress=progress).to_dict())
-    }
+    return {"shown": measurement_data(measure(request["films"], request["setup"], output, progress=progress).to_dict())}
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ class Flowing(BackgroundJob):
         return {name: said[name] for name in ("what", "failed", "done") if name in said}
 
 
-def plane_shown(plane: xr.Dataset, phase: float) -> dict[str, Any]:
+def page_plane(plane: xr.Dataset, phase: float) -> dict[str, Any]:
     """Flow plane `xz` for the page: velocities along x and z in rows of rising z, m/s, NaN in solids."""
     velocity = [plane[name].transpose("z", "x").values for name in ("velocity_x", "velocity_z")]
     speed = np.hypot(*velocity)
@@ -79,7 +79,7 @@ def _flowing(request: dict[str, Any], progress: Progress) -> dict[str, Any]:
         resolution=_COARSE if walled else None,
         phase=request["phase"],
     )
-    shown = plane_shown(around.plane("xz", resolution=_RESOLUTION, progress=progress), request["phase"])
+    shown = page_plane(around.plane("xz", resolution=_RESOLUTION, progress=progress), request["phase"])
     forces = axial_forces_of(around.prediction) if walled else []  # without walls they stand beside the numbers
     return {"plane": shown | {"forces": forces}}
 
@@ -302,7 +302,7 @@ class PageRobot:
             "description": self.robot.description or "",
             "source": self.settings.source if isinstance(self.settings.source, str) else "own",
             "shape": self._shape[1],
-            "knobs": self.settings.shown(self.robot),
+            "knobs": self.settings.knob_data(self.robot),
             "model": self.settings.model,
             "models": list(MODELS) if self.robot.channel is not None else [m for m in MODELS if m != "tube"],
             "drive": self.robot.drive.kind if self.robot.drive is not None else "",

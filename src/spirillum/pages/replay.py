@@ -80,7 +80,7 @@ _FROM_START = (("distance", "mm", 1e3), ("tail turns", "", 1.0 / _TURN), ("body 
 """Compared curves, relative to the first frame: label, unit, and factor from SI."""
 
 
-def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
+def trial_with_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
     """Replay of the trial's simulated robot, with the trial's video and curves."""
     # The simulated robot starts from rest with the first measured frame, with the tail as its file says.
     from spirillum.dynamics.simulation import simulate

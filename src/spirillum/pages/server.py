@@ -71,7 +71,7 @@ class _Guarded:
         """Why a request is refused; empty for one that is not."""
         headers, guard = Headers(scope=scope), self._guard
         host, origin = headers.get("host", ""), headers.get("origin")
-        if not guard.own_host(host):
+        if not guard.is_own_host(host):
             return "this server is not the requested host"
         if origin is not None and origin != f"http://{host}":
             return "another page has no business here"

@@ -175,12 +175,12 @@ class SimulationThread:
         last = time.perf_counter()
         while not self._ending.is_set():
             try:
-                last = self._go_on(last)
+                last = self._run_once(last)
             except Exception as error:  # the thread lives on, whatever a robot meets
                 report_fault(error)
                 self._ending.wait(_PAUSE)
 
-    def _go_on(self, last: float) -> float:
+    def _run_once(self, last: float) -> float:
         """Process commands, move and publish once; return the time of the last motion."""
         moving = self._playing and self._looked_at and any(self._moves(swimmer) for swimmer in self._swimmers)
         changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
@@ -192,7 +192,7 @@ class SimulationThread:
         elif not moving:
             last = now
         if changed:
-            self._tell_frame()
+            self._publish_frame()
         return last
 
     def _moves(self, swimmer: PageRobot) -> bool:
@@ -450,9 +450,9 @@ class SimulationThread:
         if text != self.scene:
             self.scene = text
             self.version += 1
-        self._tell_frame()
+        self._publish_frame()
 
-    def _tell_frame(self) -> None:
+    def _publish_frame(self) -> None:
         swimmers = [swimmer.frame() for swimmer in self._swimmers]
         self.frame = json.dumps({"t": "frame", "lanes": swimmers, "playing": self._playing, "behind": self._behind})
         self._publish()

@@ -12,7 +12,7 @@ from typing import Any
 
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope
-from spirillum.version import own_version
+from spirillum.version import package_version
 
 _NOT_FOR_USERS = ("test", "lint", "docs")  # extras of those who work on the package
 _REQUIREMENT = re.compile(r"(?P<name>[\w.-]+).*?(?:;.*\bextra == ['\"](?P<extra>[\w-]+)['\"])?$")
@@ -73,7 +73,7 @@ def report() -> InstallationReport:
         except PackageNotFoundError:
             absent.append(found["name"])
     return InstallationReport(
-        spirillum=own_version(),
+        spirillum=package_version(),
         python=f"{platform.python_implementation()} {platform.python_version()}",
         platform=f"{platform.system()} {platform.release()} {platform.machine()}",
         processors=os.cpu_count() or 1,

@@ -28,11 +28,11 @@ from spirillum.measurement.measure import (
     measurement_of,
 )
 from spirillum.measurement.series import movement_of, observation_rows, series_of
-from spirillum.measurement.statistics import shown
+from spirillum.measurement.statistics import rounded_with_ends
 from spirillum.measurement.trials import MEASURED, Measured, Trial
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures
 from spirillum.version import versions
-from spirillum.view.annotate import annotated_film, frame_of_film
+from spirillum.view.annotate import annotated_video, video_frame
 from spirillum.vision.camera.camera import opened
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
@@ -130,7 +130,7 @@ def _rows(quantities: Mapping[str, Measured], counts: Mapping[str, int] | None =
     return [
         {
             "name": name.replace("_", " "),
-            **shown(item.value, item.low, item.high, item.unit)._asdict(),
+            **rounded_with_ends(item.value, item.low, item.high, item.unit)._asdict(),
             "trials": str(counts[name]) if counts else "",
             "reason": item.reason,
         }
@@ -287,11 +287,11 @@ def _annotated_trial(
     if says_synthetic(video.words):
         words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}
     period = pattern_period(stripes_of(asked.setup, asked.robot))
-    film = partial(annotated_film, robot=asked.robot, words=words, period=period, waiting=video.waiting)
+    film = partial(annotated_video, robot=asked.robot, words=words, period=period, waiting=video.waiting)
     with atomic_write(target) as temporary, film(temporary, thumbnail=thumbnail) as on_frame:
         trial = measured_trial(asked, number, video, progress=on_progress, on_frame=on_frame)
     if (flag := _flag_with_frame(trial)) is not None and flag.frame is not None:
-        folder.thumbnails[name] = frame_of_film(target, flag.frame) or folder.thumbnails.get(name, b"")
+        folder.thumbnails[name] = video_frame(target, flag.frame) or folder.thumbnails.get(name, b"")
     folder.files.append(target.name)
     return trial
 

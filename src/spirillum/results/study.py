@@ -25,7 +25,7 @@ from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
 from spirillum.progress import Progress
 from spirillum.results.page import draw_pictures, load_figures
-from spirillum.results.study_content import content, shown_ranking
+from spirillum.results.study_content import content, ranking_content
 from spirillum.results.study_store import stored_study
 from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
@@ -118,7 +118,7 @@ def write_report(
     on_progress("report", len(pictures), steps)
     claims, predictions = write_tables(dataset, folder)
     names = {
-        "ranking": shown_ranking(ranking_of(dataset)),
+        "ranking": ranking_content(ranking_of(dataset)),
         "pictures": embedded,
         "claims": claims,
         "predictions": predictions,

@@ -45,7 +45,7 @@ MOST_CALIBRATIONS = 40
 MOST_WARNINGS = 100
 
 
-def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, Any]:
+def ranking_content(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, Any]:
     """The ranking as people read it: what it rests on, the best robots, a row for each of the first."""
     sizes: dict[str, list[float]] = {}  # by SI unit: all speeds have one unit
     for name in ranking.quantities:
@@ -206,7 +206,7 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         """The ranking and the warnings, or what xarray prints where nothing can be ranked."""
         if not can_be_ranked(self):
             return super().__str__()
-        shown = shown_ranking(ranking_of(self))
+        shown = ranking_content(ranking_of(self))
         rows = [shown["header"], *shown["rows"]]
         widths = [max(len(row[column]) for row in rows) for column in range(len(shown["header"]))]
         lines = [f"{self.attrs.get('title', 'Study')}: {shown['message']}", f"  {shown['basis']}"]
@@ -220,7 +220,7 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         """The ranking as a table, then the dataset as xarray shows it."""
         if not can_be_ranked(self):
             return str(super()._repr_html_())
-        shown = shown_ranking(ranking_of(self))
+        shown = ranking_content(ranking_of(self))
         head = "".join(f"<th>{escape(name)}</th>" for name in shown["header"])
         cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in shown["rows"])
         body = "".join(f"<tr>{row}</tr>" for row in cells)

@@ -125,20 +125,20 @@ _DEEPEST = 24  # nested tables up to which fields are told apart: no robot file 
 
 def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:
     """Dotted names of the fields that overrides set, those of their tables one by one."""
-    return tuple(_leaves(overrides, ""))
+    return tuple(_leaf_fields(overrides, ""))
 
 
-def _leaves(table: Mapping[str, Any], above: str) -> Iterator[str]:
+def _leaf_fields(table: Mapping[str, Any], above: str) -> Iterator[str]:
     for name, value in table.items():
         if isinstance(value, Mapping) and above.count(".") < _DEEPEST:
-            yield from _leaves(value, f"{above}{name}.")
+            yield from _leaf_fields(value, f"{above}{name}.")
         else:
             yield f"{above}{name}"
 
 
 def check_set_once(overrides: Mapping[str, Any]) -> None:
     """Refuse a field that overrides set twice, by itself and within a table, or a table that they also replace."""
-    pairs = [(leaf, path) for path, value in overrides.items() for leaf in _leaves({path: value}, "")]
+    pairs = [(leaf, path) for path, value in overrides.items() for leaf in _leaf_fields({path: value}, "")]
     for leaf, path in pairs:
         for other, beside in pairs:
             if path != beside and f"{leaf}.".startswith(f"{other}."):

@@ -17,7 +17,7 @@ from spirillum.robot.geometry import End, Shape
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.outline import profile_outline
 from spirillum.robot.placement import Placement
-from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables, TorqueCurve
+from spirillum.robot.tables import DriveKind, FrictionModel, RobotTables, TorqueCurve
 from spirillum.robot.tail_form import TailForm
 
 
@@ -157,7 +157,7 @@ class RobotBatch:
     options: ModelOptions
     drive: DriveKind | None
     joint: Literal["revolute", "fixed"]
-    friction: FrictionReading
+    friction: FrictionModel
     placement: Placement
 
     @classmethod

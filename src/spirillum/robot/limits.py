@@ -65,18 +65,18 @@ class Limit(NamedTuple):
 
     def caution(self, index: int = 0) -> Note:
         """The note where an answer is given although the requirement is broken, for robot number `index`."""
-        return Note(caution_code(self.flag), self._said(index, "accurate"), (self.field,))
+        return Note(caution_code(self.flag), self._statement(index, "accurate"), (self.field,))
 
     def sentence(self, index: int = 0) -> str:
         """Message about the violated requirement, for robot number `index`."""
-        return self._said(index, "allowed")
+        return self._statement(index, "allowed")
 
     def bound_in_words(self) -> str:
         """What is allowed, for the first robot; empty where there is no bound."""
         bound = float(self.bound[0])
         return f"{self.relation} {show(bound, self.unit)}" if np.isfinite(bound) else ""
 
-    def _said(self, index: int, word: str) -> str:
+    def _statement(self, index: int, word: str) -> str:
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))
         lack, colon, name = self.field.partition(": ")
         if colon and np.isinf(value):  # there is none

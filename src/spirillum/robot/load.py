@@ -96,7 +96,7 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
     table, changes = _extended(with_points_of_files(table, folder), source, folder)
     for path, value in overrides.items():
         _displace(table, _nested(path, value))
-        _put(table, path.split("."), value, path)
+        _set_field(table, path.split("."), value, path)
     table = with_points_of_files(table, Path())
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
     robot = _checked(table, source, tuple(_stale(table, changes)))
@@ -202,7 +202,7 @@ def _extended(
     changed = _touched(table)
     if not own:
         below, layers = _extended(tomllib.loads(preset_text(base)), f"preset {base}", folder, above)
-        return _laid_over(below, base, table), [*layers, changed]
+        return _merge_tables(below, base, table), [*layers, changed]
     path = folder / base
     if len(above) >= _MOST_LAYERS or _resolved(path, source) in above:
         raise InputError(
@@ -211,10 +211,10 @@ def _extended(
         )
     under = with_points_of_files(read_toml(path, _WHAT), path.parent)
     below, layers = _extended(under, str(path), path.parent, (*above, _resolved(path, source)))
-    return _laid_over(below, base, table), [*layers, changed]
+    return _merge_tables(below, base, table), [*layers, changed]
 
 
-def _laid_over(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[str, Any]:
+def _merge_tables(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[str, Any]:
     """A robot's tables over those of its base, with a description that holds for a robot with other values."""
     changed = _touched(table) | {name for name, value in table.items() if not isinstance(value, Mapping)} - _WORDS
     if changed:
@@ -266,7 +266,7 @@ def _nested(path: str, value: Any) -> dict[str, Any]:
 _NONE_IS_A_VALUE = ("tail.taper",)  # fields whose None, a plain helix, is another thing than their default
 
 
-def _put(table: dict[str, Any], names: list[str], value: Any, path: str) -> None:
+def _set_field(table: dict[str, Any], names: list[str], value: Any, path: str) -> None:
     """Set one dotted field; a table merges into a table, None takes the field out, but where None is a value."""
     if len(names) > _DEEPEST or not all(names):
         raise InputError(f"{path[:80]!r} is no field; allowed: a dotted field such as tail.wavelength")

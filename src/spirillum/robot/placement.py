@@ -77,7 +77,7 @@ class Placement(Options):
         return self
 
     @property
-    def is_given(self) -> bool:
+    def is_set(self) -> bool:
         """Whether any field is set."""
         return self != type(self)()
 

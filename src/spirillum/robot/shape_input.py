@@ -220,7 +220,8 @@ def _read_curve(table: dict[str, Any]) -> dict[str, Any]:
         same = own == value if name == "handedness" else _same_length(f"tail.{name}", own, value)
         if not same:
             raise refuse(
-                f"tail.{name} = {str(own)[:40]} with tail.curve, which makes it {_shown(value)}; allowed: leave it out"
+                f"tail.{name} = {str(own)[:40]} with tail.curve, which makes it {_format_size(value)}; "
+                "allowed: leave it out"
             )
     for name in ("amplitude_along", "wavelength_along"):
         if table.get(name):
@@ -255,7 +256,8 @@ def read_profile(table: dict[str, Any]) -> dict[str, Any]:
     for name, value in follows.items():
         if table.get(name) is not None and not _same_length(f"body.{name}", table[name], value):
             raise refuse(
-                f"body.{name} = {table[name]} with body.profile, which makes it {_shown(value)}; allowed: leave it out"
+                f"body.{name} = {table[name]} with body.profile, which makes it {_format_size(value)}; "
+                "allowed: leave it out"
             )
     if table.get("shape", "profile") != "profile":
         raise refuse(f"body.shape = {str(table['shape'])[:40]!r} with body.profile; allowed: leave it out")
@@ -277,7 +279,7 @@ def _check_profile(points: tuple[tuple[float, ...], ...]) -> None:
         raise refuse(f"body.profile folds back at point {int(np.argmin(steps)) + 2}; allowed: {allowed}")
 
 
-def _shown(value: str) -> str:
+def _format_size(value: str) -> str:
     """A derived size in words; a hand is one."""
     return show(parse_quantity(value, KINDS["length"]), "mm") if value.endswith(" m") else value
 

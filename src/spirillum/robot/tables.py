@@ -43,7 +43,7 @@ from spirillum.units import KINDS, show
 
 DriveKind = Literal["dc-motor", "rate", "torque", "torque-speed", "magnetic"]
 
-FrictionReading = Literal["none", "rotor", "body", "paper"]
+FrictionModel = Literal["none", "rotor", "body", "paper"]
 
 
 class TorqueCurve(NamedTuple):
@@ -187,7 +187,7 @@ class Friction(Section):
 
     effective: RotaryFriction | None = None
     """B_eff in the joint, which contains B_m G^2; unset: that alone. For the `body` reading: B of the wall."""
-    reading: FrictionReading = "rotor"
+    reading: FrictionModel = "rotor"
     """Where friction acts: `none`, `rotor` (inside the joint), `body` (on the wall), `paper` (as (19) is printed)."""
 
 
@@ -246,7 +246,7 @@ class RobotTables(Section):
         return 1.0 if self.tail.handedness == "right" else -1.0
 
     @model_validator(mode="after")
-    def _no_field_missing_or_idle(self) -> Self:
+    def _no_field_missing_or_unused(self) -> Self:
         problems = [*self._end_problems(), *self._drive_problems(), *self._problems_without_body()]
         if problems:
             raise refuse(*problems)

@@ -121,7 +121,7 @@ def reference_pose(settings: Mapping[str, Any]) -> str:
     return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference pose'}, {tilt}"
 
 
-def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
+def missing_pose_notes(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
     """A sentence for each pose at which robots have no answer, though they have one at the reference pose."""
     found = []
     for task, part in answers:
@@ -223,7 +223,7 @@ class TrialTask(OneRobot):
         return part
 
 
-def held_tasks(loaded: LoadedStudy) -> Iterator[HeldTask]:
+def axial_tasks(loaded: LoadedStudy) -> Iterator[HeldTask]:
     """One task for each robot with a table, where no model of the study computes walls."""
     if any(find_swimmer_model(name).placed for name in loaded.study.models) or loaded.count > _MOST_HELD:
         return

@@ -146,7 +146,7 @@ def described(
     }
 
 
-def laid_out(
+def labelled_answers(
     loaded: LoadedStudy,
     answers: Iterable[tuple[ModelTask, Part]],
     band: Sequence[tuple[BandTask, Part]] = (),

@@ -292,7 +292,7 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     near = np.abs(values[among] - values[winner]) <= _EQUAL * abs(values[winner])
     ties = tuple(ranked[int(place)].name for place in among[near] if place != winner)
     error = _speed_error(chosen, name, winner)
-    lead = _lead(sign * finite) if np.isfinite(error) else np.nan
+    lead = _margin(sign * finite) if np.isfinite(error) else np.nan
     places = chosen.get(f"{name}_at_place")
     if places is None:
         return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, ties, lead, error)
@@ -303,7 +303,7 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, ties, lead, error)
 
 
-def _lead(values: Values) -> float:
+def _margin(values: Values) -> float:
     """By how much the largest value leads the next one, over its own size."""
     if values.size < 2:
         return np.nan

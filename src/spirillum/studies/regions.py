@@ -17,7 +17,7 @@ import numpy as np
 from spirillum.envelope import as_json
 from spirillum.files import Stored, chunk_key, region_files
 from spirillum.fluid.registry import find_swimmer_model, quickest
-from spirillum.studies.dataset import cautions, coordinates_of, laid_out
+from spirillum.studies.dataset import cautions, coordinates_of, labelled_answers
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays, observed_at
 from spirillum.studies.work import AT_RATES, BLOCK, WITH_INTERVALS, Indices, Part, groups, one_thread_each, tasks
 from spirillum.swimming.steady import STEADY
@@ -164,7 +164,7 @@ def plan_of(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout
 
     own, seen = cut(loaded, observed, layout, next(layout.regions()).of_one)
     empty = _empty(loaded, observed)
-    template = laid_out(own, [(task, empty) for task in tasks(own)], observed=seen)
+    template = labelled_answers(own, [(task, empty) for task in tasks(own)], observed=seen)
     whole = xr.Dataset(coords=coordinates_of(loaded))
     robots = len(layout.dimensions)
     variables = {}
@@ -213,7 +213,7 @@ def encoded_region(job: RegionJob) -> dict[str, bytes]:
     region, loaded, observed, plan = job
     with one_thread_each(*loaded.study.models):
         answers = [(task, task.answer(loaded, observed)) for task in tasks(loaded)]
-    dataset = laid_out(loaded, answers, observed=observed)
+    dataset = labelled_answers(loaded, answers, observed=observed)
     places = {name: plan.place(name, region) for name in plan.regional}
     values = {}
     for name in plan.regional:

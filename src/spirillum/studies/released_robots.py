@@ -154,7 +154,7 @@ class ReleaseTask(OneRobot):
         events = [event["what"] for event in json.loads(str(run.attrs["events"]))]
         if INTERRUPTED in events:
             raise KeyboardInterrupt
-        return [_seen(run, *_window(run, name, self.ranges.duration)) for name in WINDOWS]
+        return [_observe(run, *_window(run, name, self.ranges.duration)) for name in WINDOWS]
 
 
 def _window(run: xr.Dataset, name: str, duration: float) -> tuple[float, float]:
@@ -169,7 +169,7 @@ def _window(run: xr.Dataset, name: str, duration: float) -> tuple[float, float]:
     return begin, end
 
 
-def _seen(run: xr.Dataset, begin: float, end: float) -> dict[str, float]:
+def _observe(run: xr.Dataset, begin: float, end: float) -> dict[str, float]:
     """What a camera above the channel sees of a run between two times, and the current."""
     if not np.isfinite(begin):
         return dict.fromkeys(AT_RUNS, float("nan"))

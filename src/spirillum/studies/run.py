@@ -30,13 +30,13 @@ from spirillum.studies.columns import (
     BandTask,
     HeldTask,
     TrialTask,
+    axial_tasks,
     band_tasks,
-    held_tasks,
-    left_out,
+    missing_pose_notes,
     trial_notes,
     trial_tasks,
 )
-from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, laid_out, summed
+from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, labelled_answers, summed
 from spirillum.studies.released_robots import (
     ReleaseTask,
     SettledTask,
@@ -53,7 +53,7 @@ from spirillum.swimming.cautions import CONSTANT_TORQUE, calibration_warnings
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import requirements
-from spirillum.version import own_version
+from spirillum.version import package_version
 from spirillum.worker_pool import ESTIMATE, WorkerPool, map_tasks
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ _PART = "part-{:05d}.npz"  # file of a finished answer by the number of its task
 _LARGEST_PART = 1 << 30
 
 
-def kept(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
+def stored_answer(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
     """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task."""
     if folder is None or not (folder / _PART.format(number)).is_file():
         return None
@@ -88,7 +88,7 @@ def kept(number: int, task: StudyTask, folder: Path | None, leading: tuple[int, 
 _MARK = "task"
 
 
-def keep(number: int, task: StudyTask, part: Part, folder: Path) -> None:
+def store_answer(number: int, task: StudyTask, part: Part, folder: Path) -> None:
     """Keep a finished answer."""
     with atomic_write(folder / _PART.format(number), replace="any") as path, path.open("wb") as stream:
         np.savez(stream, **cast("dict[str, Any]", {**part, _MARK: task.mark}))
@@ -103,7 +103,7 @@ def _kept_at_times(folder: Path | None) -> Iterator[Callable[[int, StudyTask, Pa
     def keep_all() -> None:
         nonlocal last
         while waiting and folder is not None:
-            keep(*waiting[0], folder)
+            store_answer(*waiting[0], folder)
             del waiting[0]
         last = monotonic()
 
@@ -127,7 +127,7 @@ _Task = TypeVar("_Task", bound=StudyTask)
 
 def study_fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
     """Hash of request and program: a dataset of another version is computed again."""
-    question = [loaded.fingerprint, observed.question() if observed else None, own_version()]
+    question = [loaded.fingerprint, observed.question() if observed else None, package_version()]
     return hashlib.sha256(json.dumps(question).encode()).hexdigest()
 
 
@@ -148,11 +148,11 @@ def computed_study(
         *band_tasks(loaded),
         *release_tasks(loaded, with_table),
         *settled_tasks(loaded, with_table),
-        *held_tasks(loaded),
+        *axial_tasks(loaded),
         *trial_tasks(loaded, with_table),
     ]
     readings = len(loaded.study.friction)
-    found = [kept(number, task, parts, task.leading(readings)) for number, task in enumerate(requested)]
+    found = [stored_answer(number, task, parts, task.leading(readings)) for number, task in enumerate(requested)]
     numbers = [number for number, part in enumerate(found) if part is None]
     missing = [requested[number] for number in numbers]
     done = len(requested) - len(missing)
@@ -184,14 +184,14 @@ def computed_study(
     warnings = warnings_of(loaded)
     warnings += [settled_basis(loaded.study.contact)] if beside.settled else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
-    warnings += left_out(band)
+    warnings += missing_pose_notes(band)
     if followed:
         warnings += _without_table(loaded, with_table)
     warnings += without_answer(part for _, part in beside.released)
     warnings += not_settled(beside.settled)
     warnings += trial_notes(beside.trials)
     warnings += warnings_of_calibrations(loaded)
-    dataset = laid_out(loaded, answers, band, beside, observed)
+    dataset = labelled_answers(loaded, answers, band, beside, observed)
     dataset.attrs = described(loaded, observed, fingerprint, list(dict.fromkeys(warnings)))
     dataset.attrs["checksum"] = checksum_of(dataset)
     return dataset
@@ -220,7 +220,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
         warnings.append(CONSTANT_TORQUE)
     requested = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _pose_notes(loaded, requested)
-    warnings += loaded.fit.idle_warnings(loaded.robots, requested)
+    warnings += loaded.fit.unused_model_warnings(loaded.robots, requested)
     warnings += loaded.fit.geometry_warnings(loaded.robots, requested)
     warnings += loaded.fit.origin_warnings(loaded.robots, requested)
     warnings += loaded.fit.torque_warnings(loaded.study.models, loaded.study.friction)

@@ -12,7 +12,7 @@ from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.arguments import in_range
 from spirillum.robot.fields import Length, Rate, Section, Text, Time, refuse
 from spirillum.robot.placement import Placement
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz, show_height
@@ -93,7 +93,7 @@ class Study(Section):
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (AUTO,)
     """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` for robots in channels (missing
     tables are made first), and `slender` for robots without."""
-    friction: Annotated[tuple[FrictionReading, ...], Field(min_length=1)] = ("none", "rotor", "paper")
+    friction: Annotated[tuple[FrictionModel, ...], Field(min_length=1)] = ("none", "rotor", "paper")
     """Friction models."""
     claims: Literal["none", "biorob2012"] = "none"  #: Whose statements to hold the results against.
     assumed_motor_rates: Annotated[tuple[Rate, ...], Field(max_length=1000)] = ()

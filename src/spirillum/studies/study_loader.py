@@ -16,7 +16,7 @@ from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.fitted.calibration_file import FittedFriction
-from spirillum.fitted.fit import NO_FIT, Fit, check_kept, read_fit
+from spirillum.fitted.fit import NO_FIT, Fit, check_not_overridden, read_fit
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.measurement.observations import (
     ObservationRow,
@@ -287,7 +287,7 @@ def _fitted_poses(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Plac
             f"{fit.name} has a friction_coefficient, and a study models no dry friction; allowed: `predict` of each "
             "robot with it"
         )
-    if study.placement.is_given:
+    if study.placement.is_set:
         return ()
     found = [fit.calibrated_placement(robot) for robot in robots]
     if not any(found):
@@ -319,7 +319,7 @@ def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> 
 def _fitted_robot(robot: Robot, fit: Fit, kept: Sequence[str], source: str) -> Robot:
     """Return the robot with fitted values, which may not replace what was set."""
     found = fit.central(robot)
-    check_kept(kept, robot, found, source)
+    check_not_overridden(kept, robot, found, source)
     return found
 
 

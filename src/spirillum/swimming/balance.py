@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, Matrix12, Samples, Values
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 
 _ZERO = np.zeros(1)
 _ZERO.setflags(write=False)
@@ -173,7 +173,7 @@ def _determinant(s: TorqueBalance, t: FrictionTorques) -> Values:
     return fluid + mixed + t.determinant
 
 
-def friction_torques(reading: FrictionReading, effective: Values, rotor_friction: Values) -> FrictionTorques:
+def friction_torques(reading: FrictionModel, effective: Values, rotor_friction: Values) -> FrictionTorques:
     """The readings of eqs (18) and (19).
 
     Args:

@@ -10,7 +10,7 @@ from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
@@ -89,7 +89,7 @@ CONSTANT_TORQUE = Note.named("constant-torque")  #: What a drive of given torque
 
 
 def drive_warnings(
-    robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
+    robot: Robot, model: SwimmerModel, reading: FrictionModel, result: Swimming, rate: float | None
 ) -> list[Note]:
     """Warnings about friction, rate and drive of an answer."""
     motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
@@ -109,7 +109,7 @@ def drive_warnings(
     return found + _prescribed_rate_warnings(robot, reading, result)
 
 
-def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note]:
+def _unset_friction_warning(robot: Robot, reading: FrictionModel) -> list[Note]:
     if reading == "none":
         return [Note.named("frictionless-motor")]
     if robot.friction.effective is not None or robot.motor is None:
@@ -119,7 +119,7 @@ def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note
     return [Note.named("no-wall-friction" if reading == "body" else "rotor-friction-alone", own=own)]
 
 
-def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[Note]:
+def _prescribed_rate_warnings(robot: Robot, reading: FrictionModel, result: Swimming) -> list[Note]:
     found = []
     if reading in ("rotor", "paper"):
         if robot.friction.effective is not None:

@@ -15,7 +15,7 @@ from spirillum.arrays import PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.kernels.core import MOST_POINTS, MOTOR_SIZE, curve_torques, steady_currents, windings
 from spirillum.robot.batch import Electrics, RobotBatch
-from spirillum.robot.tables import FrictionReading, TorqueCurve
+from spirillum.robot.tables import FrictionModel, TorqueCurve
 from spirillum.swimming.balance import (
     FRICTIONLESS,
     FrictionTorques,
@@ -94,7 +94,7 @@ class DriveState:
     """Magnetic drive: rate of the field, against which its torque works, rad/s."""
 
 
-def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRobot, PerRobot]:
+def _joint_friction(batch: RobotBatch, friction: FrictionModel) -> tuple[PerRobot, PerRobot]:
     """(B_eff or B, B_m); unset, B_eff is the rotor's own B_m alone and the wall's B is zero."""
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     if friction == "none":
@@ -103,7 +103,7 @@ def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRo
     return np.where(unset, 0.0 if friction == "body" else rotor, batch.effective_friction), rotor
 
 
-def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> DriveState:
+def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionModel) -> DriveState:
     """Motion under the robots' own drive: what the joint torque adds to coasting; the motor closes it."""
     effective, rotor = _joint_friction(batch, friction)
     t = friction_torques(friction, effective, rotor)
@@ -138,7 +138,7 @@ def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> Dr
 
 
 def at_rate(
-    batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot, motor_rate: PerRobot, friction: FrictionReading
+    batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot, motor_rate: PerRobot, friction: FrictionModel
 ) -> DriveState:
     """Motion at prescribed rates; with a DC-motor the friction follows from (17) and (18)."""
     effective, rotor = _joint_friction(batch, friction)

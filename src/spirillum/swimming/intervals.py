@@ -24,17 +24,17 @@ from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import friction_torques
-from spirillum.swimming.drawn_resistance import (
+from spirillum.swimming.drives import battery_voltage, current_at, run_time, steady_current
+from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
+from spirillum.swimming.reynolds import without_reynolds_bound
+from spirillum.swimming.sampled_resistance import (
     AxialTable,
     PosteriorFor,
     TubeResistance,
     chebyshev_points,
     sampled_discrepancy,
 )
-from spirillum.swimming.drives import battery_voltage, current_at, run_time, steady_current
-from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
-from spirillum.swimming.reynolds import without_reynolds_bound
-from spirillum.swimming.steady import LEVEL, STEADY, Intervals, Swimming, friction_reading
+from spirillum.swimming.steady import LEVEL, STEADY, Intervals, Swimming, find_friction_model
 
 OF_TORQUE = (
     "tail_torque",
@@ -65,7 +65,7 @@ def intervals_of(
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
     size = posterior.count
-    batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, placement or Placement())
+    batch, drawn = _sampled_model(without_reynolds_bound(robot), model, posterior, draws, placement or Placement())
     rates = None if tail_rate is None else np.full(size, tail_rate)
     coefficient = draws.get("friction_coefficient") if model.placed else None
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rates, friction=friction)
@@ -117,11 +117,11 @@ def without_torque(found: Intervals) -> Intervals:
     return Intervals({**found.low, **nan}, {**found.high, **nan}, found.middle)
 
 
-def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
+def sampled_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
     """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,)."""
     draws = posterior.of(robot, np.random.default_rng(1))
     size = posterior.count
-    batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, Placement())
+    batch, drawn = _sampled_model(without_reynolds_bound(robot), model, posterior, draws, Placement())
     coefficient = draws.get("friction_coefficient") if model.placed else None
     rate = np.full(size, robot.hand * (posterior.tail_rate or 1.0))
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rate, friction="none")
@@ -167,7 +167,7 @@ def sampled_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: 
     return batch
 
 
-def _drawn(
+def _sampled_model(
     robot: Robot, model: SwimmerModel, posterior: PosteriorFile, draws: Mapping[str, Samples], placement: Placement
 ) -> tuple[RobotBatch, KnownResistance]:
     """A robot for each draw, and the model with their resistances."""
@@ -290,5 +290,5 @@ def _torques_and_powers(
             effective = spare / slip
         elif not own_drive:
             found["motor_residual_torque"] = spare - (rotor * slip if friction == "body" else 0.0)
-    torques = friction_torques(friction_reading(friction), effective, rotor)
+    torques = friction_torques(find_friction_model(friction), effective, rotor)
     return found | {"effective_friction": effective, "friction_power": torques.power(body, tail)}

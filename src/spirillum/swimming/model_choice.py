@@ -53,7 +53,7 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
         return ModelChoice(UNBOUNDED, NO_CHANNEL)
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
-    if outside and (placement is None or not placement.is_given):  # a pose is refused by the model that takes poses
+    if outside and (placement is None or not placement.is_set):  # a pose is refused by the model that takes poses
         said = f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}"
         for name in (UNBOUNDED, *(name for name, model in SWIMMER_MODELS.items() if not model.placed)):
             if not broken(requirements(batch, find_swimmer_model(name))):

@@ -14,7 +14,7 @@ from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.released_motion import Motion
 from spirillum.swimming.steady import requirements, swim
@@ -58,7 +58,7 @@ def other_models(
     speed: float,
     *,
     tail_rate: float | None,
-    friction: FrictionReading,
+    friction: FrictionModel,
     motion: Motion,
     flow: float | None,
 ) -> OtherModels | None:

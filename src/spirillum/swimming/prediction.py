@@ -16,7 +16,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import what_is_fitted
+from spirillum.fluid.reference_errors import fit_clause
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.progress_messages import LEVEL, TILTED, solution_message
 from spirillum.kernels.native import run_together
@@ -27,16 +27,16 @@ from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import no_band_warnings
-from spirillum.swimming.drawn_resistance import PosteriorFor, posterior_for_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.preparation import prepared, why_no_table
 from spirillum.swimming.released_motion import Motion, ReleasedMotion, SteadyState, motion_of
+from spirillum.swimming.sampled_resistance import PosteriorFor, posterior_for_of
 from spirillum.swimming.scenario import Scenario
-from spirillum.swimming.steady import STEADY, Intervals, Swimming, friction_reading, headline
+from spirillum.swimming.steady import STEADY, Intervals, Swimming, find_friction_model, headline
 from spirillum.units import KINDS, parse_option
 
 
@@ -49,7 +49,7 @@ class Prediction(DisplayMixin):
 
     robot: Robot
     model: SwimmerModel
-    friction: FrictionReading
+    friction: FrictionModel
     calibrated: bool
     batch: RobotBatch = field(repr=False)  #: The robot at its pose, as a batch of one.
     swimming: Swimming = field(repr=False)  #: The quantities, as arrays of length one.
@@ -87,7 +87,7 @@ class Prediction(DisplayMixin):
             return free_in_tube(self.fitted_by)
         if self.model.placed and self.intervals is not None and self.band is None:
             return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
-        return self.model.own_error(self.batch, self.fitted_by)
+        return self.model.error_statement(self.batch, self.fitted_by)
 
     @cached_property
     def placement(self) -> dict[str, Any]:
@@ -132,7 +132,7 @@ class Prediction(DisplayMixin):
         """Attributes, the quantities among them."""
         return sorted({*super().__dir__(), *_QUANTITIES})
 
-    def _shown(self) -> tuple[dict[str, Any], list[str]]:
+    def _display_content(self) -> tuple[dict[str, Any], list[str]]:
         """See `DisplayMixin`: the headline quantities, without those of other models."""
         answer = self.to_dict(others=False)
         return answer, headline(answer)
@@ -201,9 +201,9 @@ def predict(
     where = fit.placed(central, given)
     choice = model if isinstance(model, ModelChoice) else choose_model(model, central, placement=where, fit=fit)
     ready, chosen, batch = prepared(
-        central, choice.model, fit=fit, resolution=resolution, placement=where if where.is_given else None
+        central, choice.model, fit=fit, resolution=resolution, placement=where if where.is_set else None
     )
-    reading = friction_reading(ready.friction.reading if friction is None else friction)
+    reading = find_friction_model(ready.friction.reading if friction is None else friction)
     rate = _rate(tail_rate, batch.placement)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
@@ -252,7 +252,7 @@ def predict(
     over = band_of(batch, chosen, result, scenario.swim, progress) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
     if intervals is not None and whose == "measured":
-        result = with_middles(result, intervals)
+        result = with_posterior_medians(result, intervals)
     acts = friction_acts(reading, rate)
     idle = fit.outside_warnings(ready, chosen, friction=acts)
     if idle:
@@ -279,12 +279,12 @@ def predict(
 
 def free_in_tube(fitted_by: str) -> str:
     """What a free motion in the tube rests on."""
-    computed = f"walls, weight and contact are computed, {what_is_fitted(fitted_by)}"
+    computed = f"walls, weight and contact are computed, {fit_clause(fitted_by)}"
     where = " where it has none" if fitted_by else ""
     return f"{computed}; roughness and dry friction are assumed{where}; contact is not validated against an experiment"
 
 
-def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:
+def with_posterior_medians(swum: Swimming, intervals: Intervals) -> Swimming:
     """The steady motion with the medians of intervals where they are known."""
     middles = {name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)}
     return replace(swum, **middles)

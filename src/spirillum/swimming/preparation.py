@@ -18,7 +18,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import tube_radius
-from spirillum.fluid.tube.library import TabledTube, find_table, prepared_tables, tables_are_kept
+from spirillum.fluid.tube.library import TabledTube, find_table, has_table_cache, prepared_tables
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import RESPONSES, STAGES, StageName, stage_of
 from spirillum.fluid.tube.table import TubeTable
@@ -67,11 +67,11 @@ def check_domain(robot: Robot, model: SwimmerModel, batch: RobotBatch) -> None:
     outside = broken(requirements(batch, quickest(model, batch)))
     if outside:
         raise InputError(
-            f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_what_helps(batch, model, outside)}"
+            f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_remedy(batch, model, outside)}"
         )
 
 
-def _what_helps(batch: RobotBatch, model: SwimmerModel, outside: list[Limit]) -> str:
+def _remedy(batch: RobotBatch, model: SwimmerModel, outside: list[Limit]) -> str:
     """Where only a thin film keeps a model from an answer: the least gap that it resolves, and what else helps."""
     if not model.placed or quickest(model, batch).form == "table":
         return ""
@@ -228,7 +228,7 @@ def prepare_all(
     asked = checked_geometries(loaded)
     if any(find_table(*robot, chosen) is None for robot in asked):
         check_cache_folder()
-        if not tables_are_kept():
+        if not has_table_cache():
             raise InputError(
                 "a table would be lost when the command ends, for SPIRILLUM_CACHE is off or no home folder is known; "
                 "allowed: SPIRILLUM_CACHE = a folder you may write to"
@@ -247,7 +247,7 @@ def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
     # A table is valid for all poses: a robot is checked on the axis, where a tail wider than its body is off the glass.
     _, _, batch = prepared(robot, "tube", placement={"eccentricity": 0.0})
     try:
-        asked = _asked(batch)
+        asked = _table_request(batch)
         _ = Places(*asked).gaps
     except InputError as error:
         if not several:
@@ -271,7 +271,7 @@ def check_usual_resolution(options: ModelOptions) -> None:
 
 def table_for(batch: RobotBatch, *, progress: Progress | None = None) -> TubeTable:
     """Return the table, with yawed poses, for motion of the first robot of a batch in its tube; made if missing."""
-    return prepared_tables([_asked(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
+    return prepared_tables([_table_request(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
 
 
 def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeometry, float]]:
@@ -300,7 +300,7 @@ def preparation_time(batch: RobotBatch, stage: StageName) -> str:
     return Places(RobotGeometry.of(batch), tube_radius(batch), STAGES[stage]).time_to_solve()
 
 
-def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:
+def _table_request(batch: RobotBatch) -> tuple[RobotGeometry, float]:
     """What decides the table of the first robot of a batch."""
     radius = tube_radius(batch)
     if not np.isfinite(radius):

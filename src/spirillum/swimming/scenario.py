@@ -13,7 +13,7 @@ from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, drive_warnings, film_limits
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
@@ -28,7 +28,7 @@ class Scenario:
     robot: Robot  #: The robot, with fitted values in place of its own.
     model: SwimmerModel
     batch: RobotBatch  #: The robot in its pose, as a batch of one.
-    friction: FrictionReading
+    friction: FrictionModel
     tail_rate: float | None  #: Lab rate of the tail, rad/s; None: the robot's drive.
     calibrated: bool  #: Whether calibration factors are applied.
     motion: str  #: Lateral motion and tilt constrained (`held`), or `free`.

@@ -21,7 +21,7 @@ from spirillum.quantities import QUANTITIES, Quantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.robot import STANDARD_GRAVITY
-from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import TorqueBalance, force_free, joined, released, with_body_factors
 from spirillum.swimming.drives import DriveState, at_rate, battery_voltage, driven, one_piece, run_time
 from spirillum.swimming.released_motion import Motion, Screw, check_full, motion_of
@@ -81,7 +81,7 @@ class Swimming(DisplayMixin):
         }
         return envelope("swimming", content, ())
 
-    def _shown(self) -> tuple[Mapping[str, Any], list[str]]:
+    def _display_content(self) -> tuple[Mapping[str, Any], list[str]]:
         """See `DisplayMixin`: the quantities that matter most."""
         answer = self.to_dict()
         return answer, [name for name in HEADLINE if name in answer][:_SHOWN]
@@ -200,7 +200,7 @@ def swim(
         raise InputError("motor_rate with drive.joint = 'fixed': nothing turns in the joint; allowed: a tail rate")
     tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")
     driven_freely = tail_rate is None and motor_rate is None
-    reading = friction_reading(batch.friction if friction is None else friction)
+    reading = find_friction_model(batch.friction if friction is None else friction)
     lateral = motion_of(motion)
     if lateral == "free":
         _check_free(batch, chosen)
@@ -229,11 +229,11 @@ def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
     return total
 
 
-def friction_reading(name: str) -> FrictionReading:
+def find_friction_model(name: str) -> FrictionModel:
     """The reading of that name."""
-    if name not in get_args(FrictionReading):
-        raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionReading))}")
-    return cast("FrictionReading", name)
+    if name not in get_args(FrictionModel):
+        raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionModel))}")
+    return cast("FrictionModel", name)
 
 
 def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
@@ -249,7 +249,7 @@ def _swim_block(
     model: SwimmerModel,
     tail_rate: PerRobot,
     motor_rate: PerRobot,
-    friction: FrictionReading,
+    friction: FrictionModel,
     motion: Motion,
     driven_freely: bool,  # noqa: FBT001 - passed on by the one caller
     calibrated: bool,  # noqa: FBT001

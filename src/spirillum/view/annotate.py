@@ -59,7 +59,7 @@ class Annotator:
         if pose is None:
             self._write(picture, (f"t = {seen.time:.2f} s", "robot not seen"))
             return picture
-        from spirillum.vision.camera.optics import seen as pixels_of
+        from spirillum.vision.camera.optics import project as pixels_of
 
         def line(points: Samples, colour: tuple[int, int, int], *, closed: bool = False) -> None:
             pixels = (pixels_of(points, pose, seen.optics) + 0.5) / times - 0.5
@@ -188,7 +188,7 @@ def _degrees(angle: float, period: float = 2.0 * math.pi) -> str:
 
 
 @contextmanager
-def annotated_film(
+def annotated_video(
     path: Path,
     robot: Robot,
     words: dict[str, str],
@@ -229,7 +229,7 @@ def annotated_film(
         thumbnail(_jpeg(kept[0]))
 
 
-def frame_of_film(path: Path, index: int) -> bytes:
+def video_frame(path: Path, index: int) -> bytes:
     """A frame of an annotated film as JPEG, by its order from 0; empty where there is none."""
     av = import_optional("av", "an annotated video", "video")
     with av.open(str(path)) as film:

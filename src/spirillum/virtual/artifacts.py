@@ -241,7 +241,7 @@ class ViewArtifacts:
         self._cables = _cables(troubles.cables, seed, size) if troubles.cables else None
         self._lamps = _mirrored_lamps(troubles.mirrored_lamps, seed, size) if troubles.mirrored_lamps else None
 
-    def seen(self, light: np.ndarray, time: float) -> np.ndarray:
+    def camera_picture(self, light: np.ndarray, time: float) -> np.ndarray:
         """A picture as the camera sees it at a time."""
         if self._lamps is not None:
             light = light + self._lamps

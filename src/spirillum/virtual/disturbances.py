@@ -70,7 +70,7 @@ class Disturbances:
         self.grain = self._grain_rng.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
         """A pool of normal noise; every row of every picture starts at a random index of it."""
 
-    def kept(self, count: int) -> np.ndarray:
+    def retained_frames(self, count: int) -> np.ndarray:
         """Whether each of a number of frames is kept, (count,); the first and the last always are."""
         lost = round(self._degradation.dropped * count)
         kept = np.ones(count, dtype=bool)
@@ -110,8 +110,8 @@ class Disturbances:
 
     def _add_bubbles(self, light: Samples, time: float) -> None:
         positions = self._bubbles + time * self._drift
-        middle = self._lens.seen(positions)
-        edge = self._lens.seen(positions + np.column_stack([self._bubble_radius, 0 * positions[:, :2]]))
+        middle = self._lens.project(positions)
+        edge = self._lens.project(positions + np.column_stack([self._bubble_radius, 0 * positions[:, :2]]))
         for (u, v, _), radius in zip(middle, np.abs(edge[:, 0] - middle[:, 0]), strict=True):
             window, du, dv = _around(light, u, v, 1.5 * radius + 2)
             far = np.hypot(du, dv) / radius
@@ -124,7 +124,7 @@ class Disturbances:
         glare = position.copy() if self._degradation.glare_moves else np.array([0.0, 0.0, position[2]])
         glare[:2] += self._glare_at
         length, diameter = self._body
-        ends = self._lens.seen(glare + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
+        ends = self._lens.project(glare + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
         scale = abs(ends[1, 0] - ends[0, 0]) / 1e-3
         area = self._degradation.glare * scale**2 * length * diameter * 0.94  # of an ellipse of axes 1.6 to 1
         minor = np.sqrt(area / (np.pi * 1.6))

@@ -40,7 +40,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz
-from spirillum.version import own_version
+from spirillum.version import package_version
 from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.optics import swimming_range
@@ -179,7 +179,7 @@ def virtual_experiment(
         "plan": plan.model_dump(exclude={"jobs"}),
         "camera": camera.model_dump(),
         "degradation": degradation.model_dump(),
-        "version": own_version(),
+        "version": package_version(),
     }
     mark = {
         "schema": "spirillum.virtual-experiment-folder/1",
@@ -241,7 +241,7 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
             name = f"{name}-{1e3 * tail.wavelength:g}-{1e3 * tail.amplitude:g}"
             robot = robot.model_copy(update={"name": name})
         found[file_name(name, {*found, _MARK, _TABLE})] = robot
-    placement = loaded.study.placement if loaded.study.placement.is_given else None
+    placement = loaded.study.placement if loaded.study.placement.is_set else None
     return _Filmed(found, loaded.study.models[0], placement)
 
 
@@ -294,13 +294,13 @@ def _finished(folder: Path, planned: Planned) -> bool:
         read_json(trial.with_name(f"{trial.name}.truth.json"), "the truth of a trial")
         with opened(trial.with_name(f"{trial.name}.truth.nc"), "a file of a trial", sys.maxsize) as file:
             begins = file.read(8)
-        whole = _is_whole_film(trial.with_name(f"{trial.name}.mp4")) and begins == b"\x89HDF\r\n\x1a\n"
+        whole = _is_complete_video(trial.with_name(f"{trial.name}.mp4")) and begins == b"\x89HDF\r\n\x1a\n"
         return whole and all((trial.parent / name).stat().st_size > 0 for name in known)
     except (OSError, ValueError):
         return False
 
 
-def _is_whole_film(path: Path) -> bool:
+def _is_complete_video(path: Path) -> bool:
     """Whether a file is a complete MP4 video: its boxes, each with its length first, fill it."""
     size, offset, kinds = path.stat().st_size, 0, set()
     with opened(path, "a video of a trial", sys.maxsize) as file:

@@ -60,7 +60,7 @@ class VirtualLens:
         head = self.eye, self.surface, self.index, focal, *self.centre, *self.distortion
         return np.array([*head, *self.turn.flat])
 
-    def seen(self, points: Samples) -> Samples:
+    def project(self, points: Samples) -> Samples:
         """Pixel u, v and height z (m) of points, (n, 3)."""
         points = np.ascontiguousarray(points, dtype=float)
         found = np.empty_like(points)
@@ -265,7 +265,7 @@ def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
 
 def framed(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens, start: float | None) -> TrialTrajectory:
     """The trajectory from a first x, or centred in the picture."""
-    _check_beside_axis(trajectory, robot, lens)
+    _check_space_around_axis(trajectory, robot, lens)
     x = trajectory.position[:, 0]
     low, high = _visible(lens, float(trajectory.position[:, 2].mean()))
     rear, nose = _extent(robot)
@@ -290,7 +290,7 @@ def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens)
     return (Note.named("robot-swims-out", seen=seen * length, length=length),)
 
 
-def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> None:
+def _check_space_around_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> None:
     """Check that the robot stays between floor and oil surface, and between the picture's upper and lower edge."""
     radius = 0.5 * robot.body.diameter
     _, y, z = trajectory.position.T

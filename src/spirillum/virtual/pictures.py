@@ -206,7 +206,7 @@ class Painter:
 
             def seen(share: float, every: int = 1, solid: RenderedSolid = solid, name: str = name) -> Samples:
                 pose = trajectory.at(time + share * exposure) if share else middle
-                return self.lens.seen(solid.vertices[::every] @ getattr(pose, name).T + pose.position)
+                return self.lens.project(solid.vertices[::every] @ getattr(pose, name).T + pose.position)
 
             blur = float(np.abs(seen(0.5, _FEW) - seen(-0.5, _FEW))[:, :2].max()) if exposure > 0 else 0.0
             count = 1 if blur < _STILL else int(np.clip(np.ceil(blur / _STEP), 2, _MAX_TIMES))
@@ -308,7 +308,7 @@ class FrameEncoder:
         light = self._painter.light(self._trajectory, time, self._exposure)
         disturbances.disturb(light, time, self._trajectory.at(time).position)
         if self._view is not None:
-            light = self._view.seen(light, time)
+            light = self._view.camera_picture(light, time)
         image = np.empty(light.shape, dtype=np.uint8)
         gain = _BRIGHTNESS * disturbances.gain(time)
         starts = disturbances.starts(light.shape[0])

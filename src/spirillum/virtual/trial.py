@@ -22,7 +22,7 @@ from spirillum.files import (
     atomic_write,
     atomic_write_all,
     guard_inputs,
-    holds_own_only,
+    holds_only_own_files,
     output_target,
     writable_target,
     write_dataset,
@@ -49,7 +49,7 @@ from spirillum.virtual.motion import TrialMotion, motion_of, motion_of_run, moti
 from spirillum.virtual.optics import VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
-from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
+from spirillum.virtual.truth import SYNTHETIC, companion_paths, rate_quantities, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,7 +67,7 @@ def video_target(path: str | Path) -> Path:
         return output_target(path, {".mp4": "a video, or a folder without an ending"}, "trial.mp4")
     if not path.is_dir():
         writable_target(path)
-    if path.exists() and not (path.is_dir() and holds_own_only(path)):
+    if path.exists() and not (path.is_dir() and holds_only_own_files(path)):
         raise InputError(f"{path} is there and not empty; allowed: a new folder for the frames, or a .mp4")
     return path
 
@@ -239,7 +239,7 @@ def render(
     inputs = [item for item in (robot, run) if isinstance(item, (str, Path)) and item != RELEASED]
     with guard_inputs(*inputs):
         target = video_target(path)
-        names = names_beside(target) if setup is None else names_beside(target, Path(setup))
+        names = companion_paths(target) if setup is None else companion_paths(target, Path(setup))
         for name in ("setup", "json", "nc"):
             writable_target(names[name])
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
@@ -256,7 +256,7 @@ def render(
         length = f"duration = {trajectory.duration:g} s makes {count} frames"
         raise InputError(f"{length}; allowed: 2 to {_MOST_FRAMES} frames")
     disturbances = Disturbances.of_robot(degradation, seed, lens, trajectory.duration, robot, tank)
-    kept, counted = counted_frames(troubles, np.flatnonzero(disturbances.kept(count)), camera.fps, seed)
+    kept, counted = counted_frames(troubles, np.flatnonzero(disturbances.retained_frames(count)), camera.fps, seed)
     robot_file = robot.name if is_preset(robot) else names["robot"].name
     height = _stated_height(float(trajectory.position[:, 2].mean()), setup_errors.depth_error, lens.surface)
     axis = height, setup_errors.depth_uncertainty
@@ -274,7 +274,11 @@ def render(
         seed=seed,
         model_reason=shown.reason,
         motion=shown.motion,
-        warnings=(*shown.warnings, *out_of_picture(trajectory, robot, lens), *_idle_seed(seed, degradation, troubles)),
+        warnings=(
+            *shown.warnings,
+            *out_of_picture(trajectory, robot, lens),
+            *_unused_seed_note(seed, degradation, troubles),
+        ),
     )
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
     attributes = {"title": tags["title"], "synthetic": "yes", "robot": robot.name}
@@ -306,7 +310,7 @@ def render(
     return written
 
 
-def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:
+def _unused_seed_note(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:
     """A sentence on a seed of a video that uses no random numbers; none without a seed."""
     plain = Degradation(crf=degradation.crf)
     if not seed or degradation != plain or troubles.uses_seed:

@@ -86,7 +86,7 @@ def truth_dataset(
     return dataset
 
 
-def names_beside(path: Path, setup: Path | None = None) -> dict[str, Path]:
+def companion_paths(path: Path, setup: Path | None = None) -> dict[str, Path]:
     """Paths of the files beside a video or a folder of frames: `setup`, `json`, `nc`, `robot`."""
     stem = path.stem if path.suffix else path.name
     ends = {"setup": "setup.toml", "json": "truth.json", "nc": "truth.nc", "robot": "robot.toml"}

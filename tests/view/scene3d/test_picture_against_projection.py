@@ -14,7 +14,7 @@ import spirillum as sp
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.view.scene3d.scene import DrawnRobot, Scene, level_height, resting
 from spirillum.view.scene3d.scenery import VIEWS, fitted
-from spirillum.view.scene3d.show import glass_around, shown_points
+from spirillum.view.scene3d.show import glass_around, scene_points
 
 SIZE = (400, 226)
 SAID = "robot.png: biorob2012-wide, 160x90 pixels, view perspective\n"
@@ -129,7 +129,7 @@ def test_channel_is_drawn_at_its_radius_and_the_robot_on_its_floor() -> None:
     pose = resting(solids)
     assert level_height(solids) == pytest.approx(-0.5 * (0.040 - 0.018), abs=1e-6)
     glass = (-0.1, 0.04)
-    camera = fitted("front", shown_points(solids, pose, glass), SIZE, (0.1, 0.1, 0.1))
+    camera = fitted("front", scene_points(solids, pose, glass), SIZE, (0.1, 0.1, 0.1))
     image = drawn(solids, camera, pose, glass=glass)
     rings = {}
     for share in (0.93, 1.017, 1.06):

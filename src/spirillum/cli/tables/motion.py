@@ -56,7 +56,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     if "trial" in answer:
         yield from released_columns(answer)
     for item in answer.get("published", ()):
-        yield _beside_published(item)
+        yield _compare_with_published(item)
     yield from files_of(answer, plot="plot")
     yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
     if "lying" in answer:
@@ -81,7 +81,7 @@ def _over_poses(answer: Answer, column: str) -> str:
     return f"{given}; low and high over {len(answer['band']['gap']['value'])} more: {ranges}"
 
 
-def _beside_published(item: Answer) -> str:
+def _compare_with_published(item: Answer) -> str:
     """A published number with ours in its unit, and their ratios."""
     paper = item["published"]
     unit = display_unit(paper["value"], paper["unit"])
@@ -134,12 +134,12 @@ def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
     names = [name for name in headline(next(m for m in models if m["model"] == reference)) if _known(models, name)]
     rows = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "model")
     for name in names:
-        unit = _shown_unit(models, name)
+        unit = _common_unit(models, name)
         rows.add_column(_SHORT[name] + (f"\n{unit}" if unit != "1" else ""), justify="right")
         if name == names[0]:
             rows.add_column(f"against\n{reference}", justify="right")
     for item in models:
-        cells = [in_unit(item[name]["value"], item[name]["unit"], _shown_unit(models, name)) for name in names]
+        cells = [in_unit(item[name]["value"], item[name]["unit"], _common_unit(models, name)) for name in names]
         against = "" if item["model"] == reference else _difference(item["relative_difference"][names[0]]["value"])
         name = f"{item['model']}*" if item["calibrated"] else str(item["model"])
         rows.add_row(name, cells[0], against, *cells[1:])
@@ -157,7 +157,7 @@ def _trial_row(trial: Answer, models: Sequence[Answer], names: Sequence[str], re
     yield "trial"
     for name in names:
         item = trial.get(name)
-        yield "-" if item is None else in_unit(item["value"], item["unit"], _shown_unit(models, name))
+        yield "-" if item is None else in_unit(item["value"], item["unit"], _common_unit(models, name))
         if name == names[0]:
             yield _difference(trial["forward_velocity"]["value"] / base - 1.0 if base else None)
 
@@ -173,7 +173,7 @@ def _all_quantities(answer: Answer, models: Sequence[Answer]) -> Blocks:
         if item["model"] != reference:
             others.add_column(item["model"], justify="right", no_wrap=True)
     for name in known:
-        unit = _shown_unit(models, name)
+        unit = _common_unit(models, name)
         cells = [in_unit(item[name]["value"], item[name]["unit"], unit) for item in models]
         words = name.replace("_", " ")
         values.add_row(words + (f", {unit}" if unit != "1" else ""), *cells)
@@ -189,7 +189,7 @@ def _known(models: Sequence[Answer], name: str) -> bool:
     return any(item[name]["value"] is not None for item in models)
 
 
-def _shown_unit(models: Sequence[Answer], name: str) -> str:
+def _common_unit(models: Sequence[Answer], name: str) -> str:
     """The unit of a quantity for all models: that of the largest value."""
     sizes = [abs(item[name]["value"]) for item in models if item[name]["value"]]
     return display_unit(max(sizes, default=None), models[0][name]["unit"])
@@ -377,7 +377,7 @@ def control(answer: Answer) -> Blocks:
     quantities = {answer["error"]["meaning"]: answer["error"]}
     quantities |= {name: answer[name] for name in ("final_position_x", "duration", "time_on", "electrical_energy")}
     yield quantity_grid(title, quantities)
-    yield f"{'good' if answer['good'] else 'not good'} enough; {_drawn(answer['drawn'])}"
+    yield f"{'good' if answer['good'] else 'not good'} enough; {_unknowns_table(answer['drawn'])}"
     frames, commands = answer["frames"], answer["commands"]
     yield (
         f"camera: {frames['taken']} frames, {frames['lost']} lost; remote: {commands['sent']} commands, "
@@ -394,7 +394,7 @@ def control(answer: Answer) -> Blocks:
     yield from files_of(answer, plot="plot", movie="movie", file="run")
 
 
-def _drawn(drawn: Answer) -> str:
+def _unknowns_table(drawn: Answer) -> str:
     """What the controller did not know."""
     details = [f"sampled: friction times {drawn['friction_factor']:.3g}"]
     if drawn["gap_factor"] != 1.0:

@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, Blocks, Detail, grid, quantity_grid, reason_of
 from spirillum.display import percent
-from spirillum.measurement.statistics import ShownNumber, shown
+from spirillum.measurement.statistics import ShownNumber, rounded_with_ends
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
 from spirillum.units import for_people, in_unit, shown_in
 
@@ -105,7 +105,7 @@ def _intervals(answer: Answer, *, several: bool) -> Iterator[Detail]:
 
 
 def _numbers(item: Answer) -> ShownNumber:
-    return shown(item["value"], item.get("low"), item.get("high"), item["unit"])
+    return rounded_with_ends(item["value"], item.get("low"), item.get("high"), item["unit"])
 
 
 def feasibility(answer: Answer) -> Blocks:

@@ -23,7 +23,7 @@ from spirillum.fluid.reference_errors import (
     WITHOUT_INTERACTION,
     speed_note,
     validation_note,
-    walls_left_out,
+    wall_clause,
 )
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
@@ -290,11 +290,11 @@ class Rft(SwimmerModel):
             f"{WITHOUT_INTERACTION} % to it"
         )
 
-    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """See `ResistanceModel.own_error`; sets other than the printed one were compared with one tail only."""
+    def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
+        """See `ResistanceModel.error_statement`; sets other than the printed one were compared with one tail only."""
         if batch.options.rft.coefficients != "printed":
-            return self.stated_error(batch.options) + walls_left_out(batch)
-        return f"{validation_note(batch, CHECKED['rft'])}; {speed_note('rft')}{walls_left_out(batch)}"
+            return self.stated_error(batch.options) + wall_clause(batch)
+        return f"{validation_note(batch, CHECKED['rft'])}; {speed_note('rft')}{wall_clause(batch)}"
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """0 < c_t < c_n, and a wire clear of the floor."""

@@ -26,7 +26,7 @@ from spirillum.fluid.reference_errors import (
     WITHOUT_INTERACTION,
     speed_note,
     validation_note,
-    walls_left_out,
+    wall_clause,
 )
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
@@ -165,10 +165,10 @@ class Sbt(SwimmerModel):
     parts = ("body", "tail", "rotor", "robot")
     axial_only = True
 
-    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """See `ResistanceModel.own_error`."""
+    def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
+        """See `ResistanceModel.error_statement`."""
         spin = "" if batch.options.sbt.spin else " (the wire's own spin, some 8 % of the torque, is an option)"
-        return f"{validation_note(batch, CHECKED['sbt'])}{spin}; {speed_note('sbt')}{walls_left_out(batch)}"
+        return f"{validation_note(batch, CHECKED['sbt'])}{spin}; {speed_note('sbt')}{wall_clause(batch)}"
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Alpha within the expansion; chi, q and psi positive, so that the block is positive definite."""

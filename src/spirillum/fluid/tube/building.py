@@ -26,20 +26,20 @@ from spirillum.fluid.tube.nodes import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.outer_resistance import (
     PHASES,
     NodeSolution,
-    all_kept,
+    all_cached,
     even_phases,
     factor_of,
     fourier,
     is_positive_definite,
     matrices_at,
+    mirror_image,
     mirrored,
+    outer_coefficients,
     outer_resistance,
-    rest_at,
-    seen_in_mirror,
     solutions,
     solved_as_one,
 )
-from spirillum.fluid.tube.progress_messages import kept_after, progress_message
+from spirillum.fluid.tube.progress_messages import progress_message, saved_state_message
 from spirillum.fluid.tube.stages import FINE, RESPONSES, Stage, response_errors
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable, finest_wire
@@ -133,7 +133,7 @@ def built_tables(
         films.join()
         solved = [_definite(one, [next(found) for _ in one.poses], progress, workers) for one in requests]
     except KeyboardInterrupt as error:
-        raise KeyboardInterrupt(kept_after(*_solved_before(wanted))) from error
+        raise KeyboardInterrupt(saved_state_message(*_solved_before(wanted))) from error
     tables = [_table(one, some) for one, some in zip(requests, solved, strict=True)]
     seconds = (time.perf_counter() - start) / len(tables)
     return [replace(table, seconds=seconds) for table in tables]
@@ -151,8 +151,8 @@ class _Request:
     @classmethod
     def of(cls, places: Places) -> _Request:
         """All poses of a robot."""
-        yawed = _held_out(places) if places.stage.yawed else []
-        return cls(places, _held_out(places, yawed=False), yawed, _nodes(places))
+        yawed = _check_poses(places) if places.stage.yawed else []
+        return cls(places, _check_poses(places, yawed=False), yawed, _nodes(places))
 
     @property
     def poses(self) -> list[NodeSolution]:
@@ -163,7 +163,7 @@ class _Request:
 def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
     """Number of nodes that are solved for separately, and how many of them are cached."""
     shared = solved_as_one(places)
-    return len(shared), sum(all_kept([places[number] for number in numbers]) for numbers in shared)
+    return len(shared), sum(all_cached([places[number] for number in numbers]) for numbers in shared)
 
 
 def _start_films(requests: Sequence[_Request], workers: int) -> Thread:
@@ -211,7 +211,7 @@ def _definite(
 def _is_definite(film: Samples, node: _Place, answers: Sequence[Samples]) -> bool:
     """Whether the outer resistance is positive definite at a node, of the robot and, with yaw, of its mirror image."""
     pose = node.pose
-    image = [(seen_in_mirror(some), replace(pose, yaw=-pose.yaw)) for some in answers[1:]]
+    image = [(mirror_image(some), replace(pose, yaw=-pose.yaw)) for some in answers[1:]]
     return all(
         is_positive_definite(outer_resistance(some, _film_of(film, at), node.t))
         for some, at in [(answers[0], pose), *image]
@@ -293,7 +293,7 @@ def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
     """The packed table from the answers to `_nodes`: with yaw of the robot and of its mirror image."""
     starts, film, level = places.geometry.form.starts, _film_of_table(places), _level(places)
     rest = [
-        rest_at(own, _film_of(film, node.pose), node.t, node.pose, starts)
+        outer_coefficients(own, _film_of(film, node.pose), node.t, node.pose, starts)
         for node, (own, *_) in zip(level, found[: len(level)], strict=True)
     ]
     most = places.most[-1]
@@ -328,8 +328,8 @@ def _powers(middle: Samples, sides: Samples) -> Samples:
 def _both_sides(film: Samples, place: _Place, starts: int, own: Samples, image: Samples) -> tuple[Samples, Samples]:
     """Fourier coefficients of the rest's factor with the nose to the left and to the right."""
     back = replace(place.pose, yaw=-place.pose.yaw)
-    left = rest_at(own, _film_of(film, place.pose), place.t, place.pose, starts)
-    return left, rest_at(seen_in_mirror(image), _film_of(film, back), place.t, back, starts)
+    left = outer_coefficients(own, _film_of(film, place.pose), place.t, place.pose, starts)
+    return left, outer_coefficients(mirror_image(image), _film_of(film, back), place.t, back, starts)
 
 
 def _interpolated(straight: Samples, pose: TubePose, count: int) -> Samples:
@@ -339,7 +339,7 @@ def _interpolated(straight: Samples, pose: TubePose, count: int) -> Samples:
     return out
 
 
-def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
+def _check_poses(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
     """Check poses of a table between its nodes, the hardest first, then random ones, each with some phases."""
     draw, least = np.random.default_rng(_SEED), np.log(0.5 * places.gaps[0])
     hardest = iter(places.stage.hardest_yawed if yawed else [(*hard, 0.0) for hard in places.stage.hardest])

@@ -67,12 +67,12 @@ def _folder(named: str) -> Path | None:
     return folder / "tube"
 
 
-def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
+def cached_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
     """Return the solution of a request, (13, 13), from the cache, or compute and cache it."""
     path = _path(question, compute)
     if path is None:
         return compute(question)
-    found = _kept(path)
+    found = _cached(path)
     if found is None:
         found = compute(question)
         content = np.ascontiguousarray(found, dtype="<f8").tobytes()
@@ -84,10 +84,10 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
     return found
 
 
-def is_kept(question: _Q, compute: Callable[[_Q], Samples]) -> bool:
-    """Whether the solution of a request is cached, so that `kept_or_computed` computes nothing."""
+def is_cached(question: _Q, compute: Callable[[_Q], Samples]) -> bool:
+    """Whether the solution of a request is cached, so that `cached_or_computed` computes nothing."""
     path = _path(question, compute)
-    return path is not None and _kept(path) is not None
+    return path is not None and _cached(path) is not None
 
 
 def _path(question: _Q, compute: Callable[[_Q], Samples]) -> Path | None:
@@ -100,7 +100,7 @@ def _path(question: _Q, compute: Callable[[_Q], Samples]) -> Path | None:
     return folder / f"{key[:40]}.f64"
 
 
-def _kept(path: Path) -> Samples | None:
+def _cached(path: Path) -> Samples | None:
     """Cached solution; None if there is none or its checksum is wrong."""
     try:
         stored = read_bytes(path, "a kept answer", 1 << 16)

@@ -37,7 +37,7 @@ class Strengths:
 
 
 @dataclass(frozen=True)
-class Held:
+class UnitMotions:
     """Wrenches on the robot for each of the 12 unit twists, and in the flow of unit mean velocity; viscosity 1."""
 
     matrix: Samples  #: R for zero net flux, 12x12, made symmetric; zero for a part that is not there.
@@ -48,7 +48,7 @@ class Held:
     strengths: Strengths = field(repr=False)  #: Underlying source strengths.
 
 
-def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> Held:
+def solve_unit_motions(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> UnitMotions:
     """Resistance of two rigid parts in a tube with no net flux, twists about the origin; wires lie `drop` lower."""
     with one_thread():
         if solids.none:
@@ -78,7 +78,7 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
     return _held(_EIGHT_PI * matrix, found)
 
 
-def _wires_alone(link: _Link) -> Held:
+def _wires_alone(link: _Link) -> UnitMotions:
     strengths = solve_wires(link.mobility, link.motion)
     matrix = link.motion.T @ strengths
     matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
@@ -96,11 +96,11 @@ def turned_motions() -> Samples:
     return turn
 
 
-def _held(full: Samples, strengths: Strengths) -> Held:
+def _held(full: Samples, strengths: Strengths) -> UnitMotions:
     turn = turned_motions()
     full = turn @ full @ turn.T
     matrix, load = full[:-1, :-1], 0.5 * (full[:-1, -1] + full[-1, :-1])
-    return Held(0.5 * (matrix + matrix.T), load, float(full[-1, -1]), asymmetry_of(matrix), strengths)
+    return UnitMotions(0.5 * (matrix + matrix.T), load, float(full[-1, -1]), asymmetry_of(matrix), strengths)
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _reduced(solids: Solids, sources: Sources) -> Reduced:
     together = [sources]
     for wires in solids.tails:
         other = Sources.of(wires, wire_system([(wire, 1) for wire in wires], solids.fineness.wire))
-        if not any(other.alike(one) for one in together):
+        if not any(other.sweep_same_circles(one) for one in together):
             together.append(other)
     found = Reduced.of(solids, together)
     solids.kept["reduced"] = found

@@ -46,7 +46,7 @@ def _read(path: Path, _changed: int) -> TubeTable | None:
         return None
 
 
-def _found(path: Path | None, key: str) -> TubeTable | None:
+def _read_table(path: Path | None, key: str) -> TubeTable | None:
     try:
         table = None if path is None else _read(path, path.stat().st_mtime_ns)
     except OSError:
@@ -54,7 +54,7 @@ def _found(path: Path | None, key: str) -> TubeTable | None:
     return table if table is not None and table.key == key else None
 
 
-def _kept(key: str, stage: StageName) -> Path | None:
+def _cache_path(key: str, stage: StageName) -> Path | None:
     """File of a stage of a table in the user's cache."""
     folder, code = cache_folder(), digest_of(built_tables.__module__)
     if folder is None or code is None:
@@ -84,20 +84,20 @@ def prepared_tables(
     """Return the tables of robots in their tubes, of a stage at least; missing ones are made and kept in the cache."""
     missing = [robot for robot in dict.fromkeys(robots) if find_table(*robot, stage) is None]
     made = built_tables(missing, stage=STAGES[stage], workers=workers, progress=progress) if missing else []
-    fresh = {(table.geometry, table.radius): _put(table) for table in made}
+    fresh = {(table.geometry, table.radius): _save(table) for table in made}
     tables = [fresh.get(robot) or find_table(*robot, stage) for robot in robots]
     return [table for table in tables if table is not None]
 
 
-def tables_are_kept() -> bool:
+def has_table_cache() -> bool:
     """Whether tables that are made are there again the next time."""
-    return _kept("", "fine") is not None
+    return _cache_path("", "fine") is not None
 
 
 def _of_key(key: str, stage: StageName) -> TubeTable | None:
-    shipped = (_found(folder / f"{key}.table", key) for folder in (_SHIPPED, *_OF_PAPERS))
+    shipped = (_read_table(folder / f"{key}.table", key) for folder in (_SHIPPED, *_OF_PAPERS))
     of_stage = (table for table in shipped if table is not None and table.stage == stage)
-    return next(of_stage, None) or _found(_kept(key, stage), key)
+    return next(of_stage, None) or _read_table(_cache_path(key, stage), key)
 
 
 _mirrors: dict[str, tuple[TubeTable, TubeTable]] = {}
@@ -111,9 +111,9 @@ def _mirrored(key: str, table: TubeTable) -> TubeTable:
     return known[1]
 
 
-def _put(table: TubeTable) -> TubeTable:
+def _save(table: TubeTable) -> TubeTable:
     """Keep a table; as the next call will find it."""
-    path = _kept(table.key, table.stage)
+    path = _cache_path(table.key, table.stage)
     if path is not None:
         try:
             table.write(path)

@@ -85,7 +85,7 @@ def solved_as_one(places: Sequence[NodeSolution]) -> list[list[int]]:
     return list(shared.values())
 
 
-def all_kept(places: Sequence[NodeSolution]) -> bool:
+def all_cached(places: Sequence[NodeSolution]) -> bool:
     """Whether the solutions at some nodes are cached for all phases of all their tails."""
     return all(
         is_solved(g, place.pose, place.fineness, p) for place in places for g, phases in place.tails for p in phases
@@ -99,7 +99,7 @@ def _solutions(
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     numbered, saved = list(enumerate(places)), "; completed poses are saved"
-    known = [number for number, place in numbered if all_kept([place])]  # they take no time, and tell of no pace
+    known = [number for number, place in numbered if all_cached([place])]  # they take no time, and tell of no pace
     for number in known:
         found[number] = _solve(places[number])
     tell(what, len(known), len(places))
@@ -182,7 +182,7 @@ def mirrored(g: RobotGeometry, phases: tuple[float, ...]) -> tuple[RobotGeometry
     return g._replace(hand=-g.hand), tuple((np.pi - phase) % (2.0 * np.pi) for phase in phases)
 
 
-def seen_in_mirror(matrices: Samples) -> Samples:
+def mirror_image(matrices: Samples) -> Samples:
     """The 8x8 of the mirror image."""
     found: Samples = MIRROR[:, None] * matrices * MIRROR
     return found
@@ -200,7 +200,7 @@ def is_positive_definite(matrices: Samples) -> bool:
     return bool(np.linalg.eigvalsh(matrices).min() > 0.0)
 
 
-def rest_at(matrices: Samples, film: Samples, t: float, pose: TubePose, starts: int = 1) -> Samples:
+def outer_coefficients(matrices: Samples, film: Samples, t: float, pose: TubePose, starts: int = 1) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36)."""
     where = f"at an offset of {show(pose.offset, 'mm')} and a pitch of {show(pose.pitch, 'deg')}"
     return fourier(factor_of(outer_resistance(matrices, film, t), where), PHASES, starts)

@@ -54,6 +54,6 @@ def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, 
     return f"{ANNOUNCED}: it is computed once from {poses} poses{before}, in {takes}"
 
 
-def kept_after(poses: int, kept: int) -> str:
+def saved_state_message(poses: int, kept: int) -> str:
     """Describe the saved state of an interrupted preparation, and how to resume it."""
     return f"{kept} of {poses} poses are saved; the same command resumes the computation"

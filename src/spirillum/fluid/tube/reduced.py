@@ -102,7 +102,7 @@ class Reduced:
 
     def serves(self, sources: Sources) -> bool:
         """Whether these wires are the ones of the basis, at any phase."""
-        return self.sources.alike(sources)
+        return self.sources.sweep_same_circles(sources)
 
     def coefficients(self, sources: Sources, placed: Samples, along: Samples) -> list[Samples]:
         """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n)."""

@@ -25,9 +25,9 @@ from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerR
 from spirillum.errors import MOST_MEMORY, InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import CHECKED, validation_note, what_is_fitted
-from spirillum.fluid.tube.cache import is_kept, kept_or_computed
-from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
+from spirillum.fluid.reference_errors import CHECKED, fit_clause, validation_note
+from spirillum.fluid.tube.cache import cached_or_computed, is_cached
+from spirillum.fluid.tube.confined import UnitMotions, share_basis, solve_unit_motions
 from spirillum.fluid.tube.domain import placement_answer, pose_limits, pose_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
 from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR
@@ -102,7 +102,7 @@ def _turned(wire: Wire, phase: float) -> Wire:
     return Wire(wire.points @ turn.T, wire.tangents @ turn.T, wire.lengths, wire.radius)
 
 
-class _Question(NamedTuple):
+class _SolveRequest(NamedTuple):
     """Request of a solution: all parameters but the viscosity and the ends."""
 
     geometry: RobotGeometry
@@ -112,15 +112,15 @@ class _Question(NamedTuple):
     phase: float
 
 
-def _held(question: _Question) -> Held:
+def _unit_motions(question: _SolveRequest) -> UnitMotions:
     g, part, pose, fineness, phase = question
     wires = [(_turned(wire, phase), 1) for wire in g.wires()] if "tail" in PIECES[part] else []
-    return held_in_tube(_solids(_solid_key(g, part, pose, fineness)), wires, pose.tail_drop)
+    return solve_unit_motions(_solids(_solid_key(g, part, pose, fineness)), wires, pose.tail_drop)
 
 
-def _computed(question: _Question) -> Samples:
+def _computed(question: _SolveRequest) -> Samples:
     """R, load and drag for viscosity 1, as one (13, 13)."""
-    held = _held(question)
+    held = _unit_motions(question)
     if np.min(np.diag(held.matrix)) < 0:
         raise InputError(
             "the flow in the tube is not resolved at this placement.gap; allowed: a wider gap or a finer tolerance"
@@ -131,20 +131,20 @@ def _computed(question: _Question) -> Samples:
 
 
 @lru_cache(maxsize=4096)
-def _answer(question: _Question) -> Samples:
-    found = kept_or_computed(question, _computed)
+def _answer(question: _SolveRequest) -> Samples:
+    found = cached_or_computed(question, _computed)
     found.flags.writeable = False
     return found
 
 
 def solved(geometry: RobotGeometry, pose: TubePose, fineness: Fineness, phase: float) -> Samples:
     """R, load and drag of a whole robot, (13, 13): viscosity 1, no net flux, twists about the origin in body axes."""
-    return _answer(_Question(geometry, "robot", pose, fineness, phase))
+    return _answer(_SolveRequest(geometry, "robot", pose, fineness, phase))
 
 
 def is_solved(geometry: RobotGeometry, pose: TubePose, fineness: Fineness, phase: float) -> bool:
     """Whether the result of `solved` is cached."""
-    return is_kept(_Question(geometry, "robot", pose, fineness, phase), _computed)
+    return is_cached(_SolveRequest(geometry, "robot", pose, fineness, phase), _computed)
 
 
 def solved_together(
@@ -166,10 +166,10 @@ def check_solvable(geometry: RobotGeometry, pose: TubePose, fineness: Fineness) 
     check_fits(_memory(_solid_key(geometry, "robot", pose, fineness)))
 
 
-def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
+def unit_motions(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> UnitMotions:
     """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux."""
     fineness = Tube().fineness(batch, index)
-    return _held(_Question(RobotGeometry.of(batch, index), "robot", pose_of(batch, index), fineness, phase))
+    return _unit_motions(_SolveRequest(RobotGeometry.of(batch, index), "robot", pose_of(batch, index), fineness, phase))
 
 
 def finest_wire(g: RobotGeometry) -> Accuracy:
@@ -202,8 +202,8 @@ class Tube(SwimmerModel):
         """
         self._coarser, self._first, self._wire = coarser, 0.5 if between else 0.0, wire
 
-    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """See `ResistanceModel.own_error`: numerical errors are estimated; the remaining one is an assumed pose."""
+    def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
+        """See `ResistanceModel.error_statement`: numerical errors are estimated; what remains is an assumed pose."""
         placement = batch.placement
         unknown = ["the gap under the body"] if placement.gap is None and placement.eccentricity is None else []
         unknown += ["the body's pitch"] if placement.pitch is None else []
@@ -214,7 +214,7 @@ class Tube(SwimmerModel):
             place = "gap and pitch are taken as given: their own uncertainty comes on top"
         standard = any(self._wire_of(batch, index) == "standard" for index in range(batch.size))
         wire = f"; without walls, {validation_note(batch, CHECKED['slender'])}" if standard else ""
-        return f"walls are computed, {what_is_fitted(fitted_by)}; {place}{wire}"
+        return f"walls are computed, {fit_clause(fitted_by)}; {place}{wire}"
 
     def fineness(self, batch: RobotBatch, index: int = 0) -> Fineness:
         """Resolution of the flow around robot number `index`."""
@@ -325,6 +325,6 @@ class Tube(SwimmerModel):
         for index in within(batch, self.part_domain(batch, part)):
             g, pose = RobotGeometry.of(batch, index), pose_of(batch, index)
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
-            question = _Question(g, part, pose, self.fineness(batch, index), turn)
+            question = _SolveRequest(g, part, pose, self.fineness(batch, index), turn)
             found[index] = number_of(batch.viscosity, index) * _answer(question)
         return found

@@ -15,7 +15,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.fluid.closed.sbt import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import CHECKED, validation_note, walls_left_out
+from spirillum.fluid.reference_errors import CHECKED, validation_note, wall_clause
 from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
@@ -118,8 +118,8 @@ class Slender(SwimmerModel):
         """See `ResistanceModel.stated_error`."""
         return _STATED[options.slender.accuracy]
 
-    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """See `ResistanceModel.own_error`."""
+    def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
+        """See `ResistanceModel.error_statement`."""
         coupled = bool(batch.coupling_length[0] > 0 and batch.coupling_diameter[0] > 0)
         found = (
             validation_note(batch, CHECKED["slender"])
@@ -127,7 +127,7 @@ class Slender(SwimmerModel):
             else "against resolved wires and a robot, drag, thrust and torque of the tail and speed agree to 0.4 %"
         )
         clearance = "; the coupling's torque is as good as its clearance" if coupled else ""
-        return f"{found}{clearance}{walls_left_out(batch)}"
+        return f"{found}{clearance}{wall_clause(batch)}"
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """See `SwimmerModel.checked_by`."""

@@ -219,7 +219,7 @@ class Sources:
         rows = [np.concatenate([getattr(one, name) for one in several]) for name in _OF_STATIONS]
         return cls(tuple(wire for one in several for wire in one.wires), *rows)
 
-    def alike(self, other: Sources) -> bool:
+    def sweep_same_circles(self, other: Sources) -> bool:
         """Whether both sweep the same circles as they turn."""
         near = 1e-9 * float(np.max(self.rho, initial=0.0))
         return self.x.shape == other.x.shape and all(

@@ -31,7 +31,7 @@ _INSET = 0.375
 """Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
 solved for with their edges, then have the right drag along and across to 0.4 %."""
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
-_TILT = 0.5  # Torque of a tilting cross-section over that of a spinning one; see `_own_torque`.
+_TILT = 0.5  # Torque of a tilting cross-section over that of a spinning one; see `_spin_torque`.
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSy
     forces = forces.reshape(3 * len(points), -1)
     motion = _on_part(np.concatenate([np.tile(np.eye(3), (len(points), 1, 1)), -skew(points)], axis=-1), part)
     if accuracy == "standard":
-        own: Samples = np.sum([_own_torque(*item) for item in wires], axis=0) / (8.0 * np.pi)
+        own: Samples = np.sum([_spin_torque(*item) for item in wires], axis=0) / (8.0 * np.pi)
         return WireSystem(forces, motion, own, np.zeros((len(points), 0, 3, 3)))
     moments, across, gradients = _first_moments([wire for wire, _ in wires], points, e2)
     spin = np.einsum("nqbl,kbl->nqk", moments, -_LEVI_CIVITA)  # gradient along l of a rotation about k: e_k x e_l
@@ -185,7 +185,7 @@ def _on_part(rows: Samples, part: np.ndarray) -> Samples:
     return motion.reshape(-1, 12)
 
 
-def _own_torque(wire: Wire, part: int) -> Samples:
+def _spin_torque(wire: Wire, part: int) -> Samples:
     """Torque over rotation of a wire's cross-sections, each alone, (12, 12); viscosity 1.
 
     4 pi a^2 per arc length about the tangent, as a spinning cylinder, and half of it across: first moments of the

@@ -45,7 +45,7 @@ def reynolds_numbers(evidence: Evidence) -> Iterator[Claim]:
         if tail is None:
             yield claim_of("largest_reynolds", *_NO_TAIL, **numbers, channel=channel, scale="")
             continue
-        if evidence.observed and np.isfinite(evidence.seen("forward_velocity", channel)[tail]):
+        if evidence.observed and np.isfinite(evidence.observation("forward_velocity", channel)[tail]):
             observed = _observed_reynolds(evidence, channel, tail)
             yield claim_of("largest_reynolds", *observed, **numbers, channel=channel, scale=_NO_SCALE)
             continue
@@ -78,7 +78,7 @@ def reynolds_numbers(evidence: Evidence) -> Iterator[Claim]:
 
 def _observed_reynolds(evidence: Evidence, channel: str, tail: tuple[int, int]) -> tuple[str, Verdict, str]:
     reynolds = LARGEST_REYNOLDS[channel].value
-    speeds = evidence.seen("forward_velocity", channel)
+    speeds = evidence.observation("forward_velocity", channel)
     found = speeds[tail] / evidence.speed_of(1.0)
     fastest = _place(speeds, int(np.nanargmax(speeds))) == tail
     close = abs(found / reynolds - 1.0) < 0.05
@@ -100,7 +100,8 @@ def velocity_drops(evidence: Evidence) -> Iterator[Claim]:
             yield claim_of("decrease", *_NO_TAIL, which=which, **numbers)
             continue
         if evidence.complete("forward_velocity"):
-            drops = evidence.seen("forward_velocity", "wide") - evidence.seen("forward_velocity", "narrow")
+            wide, narrow = (evidence.observation("forward_velocity", channel) for channel in ("wide", "narrow"))
+            drops = wide - narrow
             extreme = np.argmin(drops) if which == "lowest" else np.argmax(drops)
             there = _place(drops, int(extreme)) == tail
             found = 1e3 * float(drops[tail])
@@ -124,7 +125,7 @@ def global_drop(evidence: Evidence) -> Iterator[Claim]:
     """Loss of the global mean velocity, bounded for any rates."""
     drop = 100 * GLOBAL_DROP
     if evidence.complete("forward_velocity"):
-        wide, narrow = evidence.seen("forward_velocity")
+        wide, narrow = evidence.observation("forward_velocity")
         loss = 1.0 - narrow.sum() / wide.sum()
         words = f"observed {100 * loss:.1f} % over {wide.size} tails"
         verdict: Verdict = "agrees" if abs(loss - GLOBAL_DROP) < 0.005 else "disagrees"
@@ -132,7 +133,7 @@ def global_drop(evidence: Evidence) -> Iterator[Claim]:
     for model in evidence.confined:
         yield claim_of("global_drop", *_computed_drop(evidence, model), by=f", by {label(model)}", drop=drop)
     if evidence.complete("forward_velocity"):
-        wide, narrow = evidence.seen("forward_velocity")
+        wide, narrow = evidence.observation("forward_velocity")
         slower = f"observed of {np.count_nonzero(narrow < wide)} of {wide.size} tails"
         yield claim_of("slower", slower, _always(wide - narrow), "observed")
         return
@@ -180,7 +181,7 @@ def trends(evidence: Evidence) -> Iterator[Claim]:
     """Dependence of speed and load on wavelength and amplitude."""
     for variable, axis, sign in (("wavelength", 1, 1.0), ("amplitude", 2, -1.0)):
         if evidence.complete("forward_velocity"):
-            speeds = evidence.seen("forward_velocity")
+            speeds = evidence.observation("forward_velocity")
             kept = speeds[:, :-1] if variable == "amplitude" else speeds
             steps = sign * np.diff(kept, axis=axis)
             share = f"{np.count_nonzero(steps > 0)} of {steps.size} steps"
@@ -238,7 +239,7 @@ def body_rotation(evidence: Evidence) -> Iterator[Claim]:
             speed = evidence.free("forward_velocity", model, channel)[tail]
             rates.append(abs(body / speed * evidence.speed_of(reynolds)) / Hz)
     if evidence.complete("body_rate"):
-        seen = np.abs(evidence.seen("body_rate")) / Hz
+        seen = np.abs(evidence.observation("body_rate")) / Hz
         inside = np.nanmin(seen) > 10**-2.5 and np.nanmax(seen) < 10**-0.5
         words = f"observed {np.nanmin(seen):.3f} to {np.nanmax(seen):.3f} Hz"
         yield claim_of("body_rates", words, "agrees" if inside else "disagrees", "observed rates")
@@ -256,7 +257,7 @@ def _rotation_errors(evidence: Evidence) -> Claim:
     if not evidence.complete("body_rate", "tail_rate"):
         missing = evidence.lacking("body_rate", "tail_rate")
         return claim_of("body_rate_errors", "not computed", "undecidable", missing)
-    seen = evidence.seen("body_rate")
+    seen = evidence.observation("body_rate")
     worst = {}
     for model in evidence.models:
         found = _at_observed(evidence, "body_rotation_rate", model)
@@ -278,7 +279,7 @@ def motor_rates(evidence: Evidence) -> Iterator[Claim]:
     """Motor rates: equal in both channels, falling with amplitude, rising with wavelength."""
     observed = evidence.complete("motor_rate")
     rates = (
-        {"observed": evidence.seen("motor_rate")}
+        {"observed": evidence.observation("motor_rate")}
         if observed
         else {label(model): evidence.free("motor_rotation_rate", model) for model in evidence.models}
     )
@@ -343,7 +344,7 @@ def model_comparison(evidence: Evidence) -> Iterator[Claim]:
         missing = evidence.lacking("forward_velocity", "tail_rate")
         yield claim_of("sbt_better", "not computed", "undecidable", missing)
         return
-    seen = evidence.seen("forward_velocity")
+    seen = evidence.observation("forward_velocity")
     errors = {
         model: float(np.sqrt(np.nanmean((_at_observed(evidence, "forward_velocity", model) - seen) ** 2)))
         for model in ("sbt", "rft")

@@ -100,14 +100,14 @@ class Evidence:
         chosen = self.dataset[name].sel(model=model, friction=self.bound)
         return chosen.sel(channel=channel or ["wide", "narrow"]).values
 
-    def seen(self, name: str, channel: str | None = None) -> Values:
+    def observation(self, name: str, channel: str | None = None) -> Values:
         """An observed quantity, (wavelength, amplitude) or with both channels first."""
         chosen = self.dataset[f"observed_{name}"]
         return chosen.sel(channel=channel or ["wide", "narrow"]).values
 
     def complete(self, *names: str) -> bool:
         """Whether these quantities were observed of every tail in both channels."""
-        return self.observed and all(bool(np.all(np.isfinite(self.seen(name)))) for name in names)
+        return self.observed and all(bool(np.all(np.isfinite(self.observation(name)))) for name in names)
 
     def lacking(self, *names: str) -> str:
         """Why a statement about all tails stays open: no observations, or not of all of them."""
@@ -115,7 +115,7 @@ class Evidence:
             return NO_RATES
         counts = []
         for name in names:
-            seen = np.isfinite(self.seen(name))
+            seen = np.isfinite(self.observation(name))
             counts.append(f"{name.replace('_', ' ')} of {np.count_nonzero(seen)} of {seen.size} robots")
         return f"it speaks of all tails in both channels; the observations have {', '.join(counts)}"
 
@@ -216,7 +216,7 @@ class FrictionModelRuns:
         count, total = int(np.nansum(holds)), int(known.sum())
         lacking = f"; {self.missing}" if self.missing else ""
         if total == 0:
-            return Judgement("depends", self._nothing)
+            return Judgement("depends", self._undecided)
         if count == 0:
             return Judgement("predicted-disagrees", f"it holds in none of {total} readings{lacking}")
         if count == total:
@@ -233,7 +233,7 @@ class FrictionModelRuns:
         """The verdict on a stated number, SI; `scale` is the SI unit over the shown one."""
         known = values[np.isfinite(values)]
         if not known.size:
-            return Judgement("depends", self._nothing)
+            return Judgement("depends", self._undecided)
         low, high = float(known.min()), float(known.max())
         if np.all(np.abs(known / stated - 1.0) < _CLOSE):
             return Judgement("predicted-agrees", f"all {known.size} readings are within {100 * _CLOSE:.0f} %")
@@ -249,7 +249,7 @@ class FrictionModelRuns:
         return Judgement("depends", f"{_joined(names)}: the readings are on both sides, on average {means}")
 
     @property
-    def _nothing(self) -> str:
+    def _undecided(self) -> str:
         """Reason why no reading decides."""
         if self.missing:
             return f"no table: {self.missing}"

@@ -51,7 +51,7 @@ def other_tube(found: Prediction, released: Mapping[str, Any] | None = None) -> 
     return None
 
 
-def published_beside(found: Prediction, beside: Prediction | None) -> list[dict[str, Any]]:
+def published_values(found: Prediction, beside: Prediction | None) -> list[dict[str, Any]]:
     """Return what the paper states of this robot, with our held and trial values; empty for any other request.
 
     The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide

@@ -45,7 +45,7 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         )
         panels = sheet.panels.ravel()
         add_letters(panels)
-        fine, turning, lag = _held(dataset)
+        fine, turning, lag = _constrained_response(dataset)
         advance = float(dataset["held_forward_velocity"][0] / dataset["held_tail_rotation_rate"][0])
         panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)
         panels[0].plot(rate, speeds(speed), color=COLOURS["blue"], **_POINTS)
@@ -69,7 +69,7 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         return sheet.finished()
 
 
-def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
+def _constrained_response(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
     """Rates of the field and of the constrained robot, Hz, and its phase lag, rad, in closed form."""
     rates, step_out = dataset["field_rate"].values / Hz, float(dataset["step_out_rate"]) / Hz
     sense = float(np.sign(rates[0]))

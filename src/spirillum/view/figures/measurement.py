@@ -71,8 +71,8 @@ def trial_figure(trial: Trial) -> Figure:
             left.text(0.02, 0.96, "not given: see the flags", transform=left.transAxes, va="top", color="#9c3d00")
     for axes in panels[-1]:
         axes.set_xlabel("time (s)")
-    left_out = {name: _left_out(values[name], trial.fits[name]) for name, _, _ in _SERIES}
-    panels[0][0].set_title(f"measured, with the fit{_why_left_out(list(left_out.values()))}", loc="left")
+    left_out = {name: _omitted_frames(values[name], trial.fits[name]) for name, _, _ in _SERIES}
+    panels[0][0].set_title(f"measured, with the fit{_omission_legend(list(left_out.values()))}", loc="left")
     panels[0][1].set_title("residuals", loc="left")
     _say_synthetic(figure, synthetic=trial.synthetic)
     figure.align_ylabels()
@@ -95,7 +95,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     values = values - values[known][0]
     scale = UnitPrefix.of(values, "m") if unit == "m" else UnitPrefix(2 * np.pi, "turns")
     few = slice(None, None, max(1, time.size // _MOST_POINTS))
-    out = _left_out(values, rate)
+    out = _omitted_frames(values, rate)
     for shown, colour in ((~out, COLOURS["sky"]), (out, _LEFT_OUT)):
         dots = np.where(shown, scale(values), np.nan)
         left.plot(time[few], dots[few], ".", color=colour, markersize=2.5, rasterized=True)
@@ -113,14 +113,14 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     right.set_ylabel(f"residual ({small.unit})")
 
 
-def _left_out(values: Samples, rate: Rate) -> np.ndarray:
+def _omitted_frames(values: Samples, rate: Rate) -> np.ndarray:
     """Frames that were read and are left out of the line, (n,)."""
     if rate.residual.size != values.size:
         return np.zeros(values.shape, dtype=bool)
     return np.isfinite(values) & ~np.isfinite(rate.residual)
 
 
-def _why_left_out(left_out: Sequence[np.ndarray]) -> str:
+def _omission_legend(left_out: Sequence[np.ndarray]) -> str:
     """Explain the grey dots: omitted first frames of a compressed video, and outliers."""
     lead = any(out.size > LEADING and out[:LEADING].all() for out in left_out)
     stray = any(out[LEADING if lead else 0 :].any() for out in left_out)

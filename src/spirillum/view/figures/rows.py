@@ -114,7 +114,7 @@ def _own_drive(axes: Axes, part: StudyView, x: Values, name: str, scale: UnitPre
     for model in part.models:
         low, high = part.band(name, model)
         draw_band(axes, x, scale(low), scale(high), look_of_model(model), joined=part.grid)
-        for number, reading in enumerate(part.own_drive_readings):
+        for number, reading in enumerate(part.free_friction_models):
             y = scale(part.values(name, model=model, friction=reading))
             draw_curve(axes, x, y, look_of_model(model), hollow=number > 0, joined=part.grid)
 
@@ -131,7 +131,7 @@ def _own_rate_row(shown: StudyView) -> PanelRow:
 
 def bound_row(shown: StudyView) -> PanelRow:
     """Forward velocity bounded by friction, in axial motion, and in the steady state of released robots."""
-    labels = {"friction": list(shown.own_drive_readings)}
+    labels = {"friction": list(shown.free_friction_models)}
     scale = shown.scale("m/s", "forward_velocity", **labels)
 
     def draw(axes: Axes, part: StudyView, x: Values) -> None:
@@ -211,7 +211,7 @@ def draw_means(axes: Axes, x: Values, y: Values, half: Values, *, hollow: bool =
 
 
 def _observed_rows(shown: StudyView) -> list[PanelRow]:
-    reading = shown.at_rate_reading
+    reading = shown.prescribed_friction_model
     speed = shown.scale("m/s", "observed_forward_velocity", "forward_velocity_at_observed_rate", friction=[reading])
     inferring = [name for name in ("rotor", "paper") if name in shown.readings]
 
@@ -262,7 +262,7 @@ def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> PanelR
 
 def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
     """Legend entries for models, readings and observations."""
-    readings = _reading_entries(shown) if own_drive else ()
+    readings = _friction_entries(shown) if own_drive else ()
     return [*_model_entries(shown), *band_handles(shown), *readings, *_observed_entries(shown)]
 
 
@@ -286,11 +286,11 @@ def _model_entries(shown: StudyView) -> Iterator[Line2D]:
         yield Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model))
 
 
-def _reading_entries(shown: StudyView) -> Iterator[Line2D]:
+def _friction_entries(shown: StudyView) -> Iterator[Line2D]:
     """Filled and hollow marks: those of the model, or of several models a grey circle."""
     only = look_of_model(shown.models[0]) if len(shown.models) == 1 else None
     colour, marker = ("#555555", "o") if only is None else (only.colour, only.marker)
-    for number, reading in enumerate(shown.own_drive_readings):
+    for number, reading in enumerate(shown.free_friction_models):
         yield Line2D(
             [],
             [],
@@ -298,7 +298,7 @@ def _reading_entries(shown: StudyView) -> Iterator[Line2D]:
             linestyle="none",
             marker=marker,
             markerfacecolor="white" if number else colour,
-            label=shown.reading_label(reading),
+            label=shown.friction_label(reading),
         )
 
 

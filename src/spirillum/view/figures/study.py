@@ -53,7 +53,7 @@ def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] 
             ending = f"-part{number + 1}" if len(pages) > 1 else ""
             name = _free_name(_file_name(shown, channel) + ending, found)
             part = f" · part {number + 1} of {len(pages)}" if len(pages) > 1 else ""
-            left_out = _left_out(shown, sum(map(len, pages)), len(channels))
+            left_out = _omitted_note(shown, sum(map(len, pages)), len(channels))
             found[name] = _channel_picture(shown, channel, wavelengths, part, left_out)
     found[_free_name("bound", found)] = _bound_picture(shown)
     return found
@@ -90,7 +90,7 @@ def _channel_title(shown: StudyView, channel: int) -> str:
     return f"{name[:1].upper()}{name[1:]} channel, $D_{{ch}}$ = {diameter[0] / scale.factor:.4g} {scale.unit}"
 
 
-def _left_out(shown: StudyView, wavelengths: int, channels: int) -> str:
+def _omitted_note(shown: StudyView, wavelengths: int, channels: int) -> str:
     """Note on omitted robots; empty if there are none."""
     sizes = shown.whole.sizes
     parts = []
@@ -213,7 +213,7 @@ def _bound_picture(shown: StudyView) -> Picture:
             bound_row(shown).tells if shown.settled else "",
             shown.pose_words,
             part.unanswered(),
-            _left_out(shown, len(wavelengths), len(channels)),
+            _omitted_note(shown, len(wavelengths), len(channels)),
         )
         if note
     ]
@@ -228,14 +228,14 @@ def _bound_picture(shown: StudyView) -> Picture:
 def _frictions(shown: StudyView) -> list[str]:
     """Friction models of the plotted motors, with marks if there are several."""
     words = {"none": "as fast as it can against the fluid alone", "rotor": "with the rotor's own friction"}
-    readings = shown.own_drive_readings
+    readings = shown.free_friction_models
     found = [words.get(reading, f"with friction model '{reading}'") for reading in readings]
     marks = ("filled", "hollow")
     return found if len(found) == 1 else [f"{one} ({mark})" for one, mark in zip(found, marks, strict=False)]
 
 
 def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], title: str) -> Figure:
-    speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.own_drive_readings))
+    speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.free_friction_models))
     legend = [
         *model_handles(shown, own_drive=True),
         *settled_handles(shown),

@@ -134,11 +134,11 @@ class StudyView:
         )
 
     @cached_property
-    def own_drive_readings(self) -> tuple[str, ...]:
+    def free_friction_models(self) -> tuple[str, ...]:
         """Readings shown for free swimming: without friction, and with friction in the joint."""
         return tuple(name for name in ("none", "rotor") if name in self.readings) or self.readings[:1]
 
-    def reading_label(self, reading: str) -> str:
+    def friction_label(self, reading: str) -> str:
         """Legend label of a friction model."""
         if reading == "none":
             return (
@@ -149,7 +149,7 @@ class StudyView:
         return f"friction model '{reading}'"
 
     @property
-    def at_rate_reading(self) -> str:
+    def prescribed_friction_model(self) -> str:
         """Reading under which the models run at prescribed rates: `rotor`, which leaves their motion alone."""
         return next((name for name in ("rotor", "none") if name in self.readings), self.readings[0])
 
@@ -178,7 +178,7 @@ class StudyView:
 
     def advance_per_turn(self, model: str) -> Values:
         """Forward velocity over the tail's rate, m/turn; without friction, where readings differ."""
-        return self.values("advance_per_radian", model=model, friction=self.own_drive_readings[0]) * Hz
+        return self.values("advance_per_radian", model=model, friction=self.free_friction_models[0]) * Hz
 
     @cached_property
     def banded(self) -> tuple[str, ...]:
@@ -198,9 +198,9 @@ class StudyView:
 
     def band(self, name: str, model: str) -> tuple[Values, Values]:
         """Limits of a quantity of free swimming, of a posterior or over unspecified poses, SI; NaN without them."""
-        reading = self.own_drive_readings[0]
+        reading = self.free_friction_models[0]
         if model in self.with_intervals:
-            named = {"model": model, "friction": self.own_drive_readings[-1]}
+            named = {"model": model, "friction": self.free_friction_models[-1]}
             return self.values(f"{name}_interval_low", **named), self.values(f"{name}_interval_high", **named)
         if model not in self.banded:
             unknown = np.full_like(self.values(name, model=model, friction=reading), np.nan)
@@ -220,12 +220,12 @@ class StudyView:
     def _interval_words(self) -> str:
         if not self.with_intervals:
             return ""
-        names, reading = ", ".join(self.with_intervals), self.own_drive_readings[-1]
+        names, reading = ", ".join(self.with_intervals), self.free_friction_models[-1]
         return f"Shades: 95 % intervals of the posterior ({names}, friction model '{reading}'), discrepancy included."
 
     @property
-    def _words_of_first_reading(self) -> str:
-        reading = self.own_drive_readings[0]
+    def _words_of_first_friction_model(self) -> str:
+        reading = self.free_friction_models[0]
         return "without friction" if reading == "none" else f"friction model '{reading}'"
 
     def _band_words(self) -> str:
@@ -236,7 +236,7 @@ class StudyView:
         return (
             f"Bands: the least to the largest value over gaps of {np.nanmin(gaps) * 1e3:.3g} to "
             f"{np.nanmax(gaps) * 1e3:.3g} mm and pitches of {np.nanmin(pitches):.3g} to {np.nanmax(pitches):.3g} deg "
-            f"({self._words_of_first_reading}), none of them likelier than another."
+            f"({self._words_of_first_friction_model}), none of them likelier than another."
         )
 
     def observed_motor_rate(self) -> tuple[Values, Values]:
@@ -250,7 +250,7 @@ class StudyView:
 
     def unanswered(self) -> str:
         """Note on robots of this part without a result; empty if there are none."""
-        outside = self.dataset["outside"].sel(friction=list(self.own_drive_readings))
+        outside = self.dataset["outside"].sel(friction=list(self.free_friction_models))
         codes = np.asarray(outside.max("friction").values).ravel()
         missing = Counter(int(code) for code in codes if code)
         if not missing:

@@ -258,7 +258,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
         axes.set_yscale("log")
         axes.set_ylim(max(0.1 * min(largest) / scale.factor, top * 10.0**-_DECADES), 3.0 * top)
     elif film:
-        _draw_film(axes, dataset, values, scale)
+        _draw_gap_axis(axes, dataset, values, scale)
     elif panel.lines[0][0] == "wall_gap":
         axes.set_ylim(bottom=min(0.0, float(np.nanmin(values)) / scale.factor))
     axes.set_ylabel(f"{panel.label}{' ' if beside > 1 else chr(10)}({scale.unit})")
@@ -278,7 +278,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
         _make_room(axes, -(-len(lines) // columns) * (1.0 if beside > 1 else 2.0))
 
 
-def _draw_film(axes: Axes, dataset: xr.Dataset, values: Samples, scale: UnitPrefix) -> None:
+def _draw_gap_axis(axes: Axes, dataset: xr.Dataset, values: Samples, scale: UnitPrefix) -> None:
     """A logarithmic axis for gaps, with the height of the asperities: below it they carry."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     roughness = float(dataset.attrs.get("roughness", np.nan))

@@ -23,9 +23,9 @@ from spirillum.units import display_unit, show
 from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK, round_length
 from spirillum.view.figures.style import COLOURS, with_micro
-from spirillum.view.scene3d.rendering import FILMS, film_writer
+from spirillum.view.scene3d.rendering import FILMS, video_writer
 from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
-from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
+from spirillum.view.scene3d.show import checked_size, glass_around, scene_points
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,7 +177,7 @@ def film(
     if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
     shots = _Shots(solids, poses, view, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
-    with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
+    with atomic_write(target) as temporary, video_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, _about(dataset, model), speed)) as images:
             for number, image in enumerate(images):
                 tell(progress, "film", number, times.size)
@@ -226,10 +226,10 @@ class _Shots:
             start = several[0].position
             several = [pose._replace(position=pose.position - self._free * (pose.position - start)) for pose in several]
             glass = glass_around(self._solids, float(start[0]), float(start[0]))
-        points = np.concatenate([shown_points(self._solids, pose, glass) for pose in several])
+        points = np.concatenate([scene_points(self._solids, pose, glass) for pose in several])
         camera = fitted(self._view, points, self._size)
         if self._follows and self._glass is not None:
-            points = np.concatenate([points, shown_points(self._solids, several[0], self._glass)])
+            points = np.concatenate([points, scene_points(self._solids, several[0], self._glass)])
         height = camera.pixels(points, self._size)[:, 1] - 0.5 * self._size[1]
         rows = 2 * int(np.ceil(np.abs(height).max()) + 4)
         return camera, rows if self._glass is not None and rows < self._size[1] else None

@@ -96,7 +96,7 @@ _PALETTE_FRAMES = 9
 _QUALITY = {"crf": "18", "preset": "veryfast"}
 
 
-def film_writer(
+def video_writer(
     path: Path, size: tuple[int, int], fps: int, words: dict[str, str]
 ) -> AbstractContextManager[H264Writer | _Gif]:
     """A writer for frames of one size; the file is complete when the block ends."""

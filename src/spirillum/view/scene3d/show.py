@@ -115,7 +115,7 @@ def show(
     solids = DrawnRobot.of(loaded, fineness=2.0)
     pose = resting(solids, turned)
     glass = glass_around(solids, pose.position[0], pose.position[0]) if channel else None
-    camera = fitted(view, shown_points(solids, pose, glass), pixels)
+    camera = fitted(view, scene_points(solids, pose, glass), pixels)
     if window:
         with Scene(solids, pixels, glass=glass, live=True) as scene:
             scene.place(pose)
@@ -152,7 +152,7 @@ def glass_around(
     return (start, end) if start < end else None
 
 
-def shown_points(solids: DrawnRobot, pose: RobotPose, glass: tuple[float, float] | None) -> Samples:
+def scene_points(solids: DrawnRobot, pose: RobotPose, glass: tuple[float, float] | None) -> Samples:
     """(n, 3) points that a picture has to hold: the robot at any angle of its tail, and the ends of the glass, m."""
     from spirillum.view.scene3d.scenery import WALL
 

@@ -11,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.optics import DIRECTIONS
 from spirillum.vision.camera.ruler import Lines, resolved, ruler_in, still_picture
-from spirillum.vision.camera.scale import CalibratedCamera, fitted_camera, given_camera, lens_of
+from spirillum.vision.camera.scale import CalibratedCamera, camera_of_setup, fitted_camera, lens_of
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Frame, Video, open_video
 from spirillum.vision.video.pictures import reduction
@@ -94,7 +94,7 @@ def sight_of(
     board = setup.camera.checkerboard
     lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size, video.display)
     if setup.markers.spacing is None:
-        return given_camera(setup, video.size, lens)._replace(reduction=factor)
+        return camera_of_setup(setup, video.size, lens)._replace(reduction=factor)
     bounds = bounds_of(setup, video)
     lines, factor = ruler_of(still, bounds, -DIRECTIONS[setup.robot.direction], factor, frames)
     if lines is None:

@@ -63,7 +63,7 @@ class Optics:
         about_y = np.array([[c_y, 0.0, s_y], [0.0, 1.0, 0.0], [-s_y, 0.0, c_y]])
         about_z = np.array([[c_z, -s_z, 0.0], [s_z, c_z, 0.0], [0.0, 0.0, 1.0]])
         axes = (about_x @ about_y @ about_z).T  # rows: right, up and backwards of the camera
-        u, v = self.middle if self.centre is None else self.centre
+        u, v = self.picture_centre if self.centre is None else self.centre
         refracts = self.surface is not None and self.index != 1.0
         surface, index = (self.surface, self.index) if refracts else (-1e30, 1.0)
         head = [self.focal, u, v, self.k1, self.k2, self.height, surface, index]
@@ -75,7 +75,7 @@ class Optics:
         return self.direction in ("up", "down")
 
     @property
-    def middle(self) -> tuple[float, float]:
+    def picture_centre(self) -> tuple[float, float]:
         """Centre of the picture, pixels."""
         return 0.5 * (self.size[0] - 1.0), 0.5 * (self.size[1] - 1.0)
 
@@ -96,7 +96,7 @@ class Optics:
     @cached_property
     def origin(self) -> Samples:
         """Point at the height of the axis on the ray of the picture's centre: the origin of a track, m, (3,)."""
-        return np.asarray(self.points(np.array([self.middle]), self.axis_height)[0])
+        return np.asarray(self.points(np.array([self.picture_centre]), self.axis_height)[0])
 
     @cached_property
     def length_per_pixel(self) -> float:
@@ -110,7 +110,9 @@ class Optics:
         if factor == 1:
             return self
         size = self.size[0] // factor, self.size[1] // factor
-        u, v = ((at - 0.5 * (factor - 1)) / factor for at in (self.middle if self.centre is None else self.centre))
+        u, v = (
+            (at - 0.5 * (factor - 1)) / factor for at in (self.picture_centre if self.centre is None else self.centre)
+        )
         return replace(self, size=size, focal=self.focal / factor, centre=(u, v))
 
     def moved(self, changes: Mapping[str, float]) -> Self:
@@ -139,12 +141,12 @@ def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
     return turned
 
 
-def seen(points: Samples, pose: BodyPose, optics: Optics) -> Samples:
+def project(points: Samples, pose: BodyPose, optics: Optics) -> Samples:
     """Project points (k, 3) in the body's frame, m, to pixels (k, 2)."""
     return optics.pixels(placed(points, pose, optics.axis_height))
 
 
-def places_seen_by(one: Optics, other: Optics, places: Samples) -> Samples:
+def positions_seen_by(one: Optics, other: Optics, places: Samples) -> Samples:
     """Positions (n, 2) by camera `one` at the pixels where camera `other` shows `places` (n, 2), at axis height, m."""
     points = np.column_stack([places, np.full(len(places), other.axis_height)])
     return np.asarray(one.points(other.pixels(points), one.axis_height)[:, :2])

@@ -49,9 +49,9 @@ def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: D
         if stored is None or header is None:
             raise InputError(f"camera.checkerboard: {name} cannot be read as an image; allowed: png, jpg, tif, bmp")
         stored = eight_bit(stored, bits_of(stored))
-        grey = header.display.shown(stored)
+        grey = header.display.display_picture(stored)
         if grey.shape[::-1] != size and display.size(header.size) == size:
-            grey = display.shown(stored)
+            grey = display.display_picture(stored)
         if grey.shape[::-1] != size:
             seen_size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
             raise InputError(
@@ -122,7 +122,7 @@ class CalibratedCamera(NamedTuple):
     reduction: int = 1  #: Factor by which pictures may be reduced to be looked at as a whole: the ruler is resolved.
 
 
-def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> CalibratedCamera:
+def camera_of_setup(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> CalibratedCamera:
     """The upright camera of a setup that gives a length per pixel."""
     wanted = setup.markers.length_per_pixel
     assert wanted is not None  # noqa: S101 - the setup ensures it

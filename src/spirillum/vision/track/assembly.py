@@ -16,14 +16,14 @@ from spirillum.robot.robot import Robot
 from spirillum.robust import least_squares_line
 from spirillum.vision.camera.anchor import Steadied, steadied, sways
 from spirillum.vision.camera.camera import opened, samples_of, scale_of
-from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
+from spirillum.vision.camera.optics import BodyPose, Optics, placed, positions_seen_by
 from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
-from spirillum.vision.track.cuts import Hops, clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
+from spirillum.vision.track.cuts import Hops, clock_of, cuts_in, hops_in, no_motion_flag, one_picture, standstill_flag
 from spirillum.vision.track.false_detection import far_apart, something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection, learnt_from
@@ -33,7 +33,7 @@ from spirillum.vision.track.size import LENGTHS, AlignedTrack, align_with_path, 
 from spirillum.vision.track.steadiness import PictureSteps, camera_flags, picture_steps
 from spirillum.vision.track.steps import FrameDetection, FrameTracker, Record
 from spirillum.vision.track.track import CUES, Agreement, RobotMotion, Track, agreement_of
-from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
+from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, static_object_flag, unwrapped
 from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
@@ -150,7 +150,7 @@ def track_of(
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
     other = something_else(time, pose, (roll, tail), body.robot.body.length, optics.length_per_pixel)
     pose[other] = errors[other] = elongation[other] = np.nan
-    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
+    position = positions_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     along = AlignedTrack(position, pose[:, 2], ())
     if setup.markers.spacing is None:  # no ruler shows how the camera is rolled
         along = align_with_path(time, *along[:2])
@@ -187,8 +187,8 @@ def track_of(
         *hops.flags,
         *clock.flags,
         *one_picture(motion),
-        *stands_still(motion, pixel),
-        *(() if known.stands else nothing_moves(motion, body.robot) or stands_flag(motion, pixel)),
+        *standstill_flag(motion, pixel),
+        *(() if known.stands else static_object_flag(motion, body.robot) or no_motion_flag(motion, pixel)),
     )
     return Track(
         time=time,
@@ -200,7 +200,7 @@ def track_of(
         position_error=errors[:, 0] * optics.focal / sight.optics.focal,
         body_angle_error=np.where(np.isfinite(body_angle), even.error, np.nan),
         tail_phase_error=np.where(np.isfinite(tail_phase), tail[:, 1], np.nan),
-        picture=_drawn(pose, body.robot, optics),
+        picture=_end_pixels(pose, body.robot, optics),
         size=video.size,
         scale=scale,
         setup=setup,
@@ -281,7 +281,7 @@ def _readings(
     )
 
 
-def _drawn(pose: Samples, robot: Robot, optics: Optics) -> Samples:
+def _end_pixels(pose: Samples, robot: Robot, optics: Optics) -> Samples:
     """Pixels of the body's mid-length and of its nose on every frame, (n, 4)."""
     axis = np.array([[0.0, 0.0, 0.0], [0.5 * robot.body.length, 0.0, 0.0]])
     out = np.full((len(pose), 4), np.nan)

@@ -308,7 +308,7 @@ class BodyFinder:
         ) ** 2
         return shifts - self._bias, known, np.where(known, variance + self._scatter**2, np.inf)
 
-    def _seen_edges(self, part: _Part, pose: BodyPose, *, seal_only: bool, rough: bool) -> _Edges:
+    def _edge_displacements(self, part: _Part, pose: BodyPose, *, seal_only: bool, rough: bool) -> _Edges:
         """Displacements of all edges: of the outline by brightness, and of the seal by its colours too."""
         if seal_only:
             pixels, normals, _, slopes = self._seal_contour.places(pose, self.optics)
@@ -340,7 +340,7 @@ class BodyFinder:
         if seal_only and part.colours is None:
             return lost
         for step in range(rough + OUTLINE.iterations):
-            edges = self._seen_edges(part, BodyPose(*pose), seal_only=seal_only, rough=step < rough)
+            edges = self._edge_displacements(part, BodyPose(*pose), seal_only=seal_only, rough=step < rough)
             known, slopes = edges.known, edges.slopes
             if known.sum() < 12:
                 return lost

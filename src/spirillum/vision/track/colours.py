@@ -125,7 +125,7 @@ def _nearest(samples: Samples, palette: Samples) -> np.ndarray:
     return np.asarray(np.argmin(distance, axis=-1))
 
 
-def order_seen(
+def check_order(
     profiles: Samples,
     angles: Samples,
     palettes: tuple[Samples, Samples, Samples],
@@ -186,7 +186,7 @@ def named_rightly(palette: Samples, start: Samples) -> bool:
     return bool(np.trace(cost) <= 1.2 * cost[rows, columns].sum() + 1e-9)
 
 
-def told_apart(samples: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
+def are_distinguishable(samples: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
     """Whether the classes that are seen are two or more, and differ as their names do."""
     # Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may
     # be learnt as colours: they differ by much less.
@@ -208,7 +208,9 @@ def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
     return by_name
 
 
-def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples], stated: float) -> float:
+def observed_width(
+    profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples], stated: float
+) -> float:
     """Median width of the stripes that are fully in view, rad; NaN for too few of them."""
     palette, _, glare = palettes
     step, widths = float(angles[1] - angles[0]), []
@@ -261,7 +263,7 @@ def is_single(stripes: Sequence[str]) -> bool:
     return len(set(stripes)) == 2 and 2.0 * np.pi * widest > SINGLE_LINE.bare
 
 
-def seen_line(profiles: Samples, facing: np.ndarray, order: Whole) -> SeenLine | None:
+def initial_line_colours(profiles: Samples, facing: np.ndarray, order: Whole) -> SeenLine | None:
     """Colours of seal and line, and what the lamp adds, to begin with; None where no line is seen to move."""
     seen = np.where(facing[..., None], profiles, np.nan)
     known = np.asarray(np.isfinite(seen).all(axis=2))

@@ -162,7 +162,7 @@ def one_picture(motion: RobotMotion) -> tuple[Flag, ...]:
     return (Flag("one-picture", sentence, EVERYTHING),)
 
 
-def stands_still(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
+def standstill_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
     """Flag a robot that turns, but does not advance by half a pixel."""
     # A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong
     # compression leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the
@@ -291,7 +291,7 @@ def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:
     return np.asarray(gaps[place[2 * CUTS.window - 1 : -1]] == gaps[place[: -2 * CUTS.window]])
 
 
-def stands_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
+def no_motion_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
     """Flag a robot that neither advances nor turns, whose stripes or tail were read."""
     time, x, body_angle, tail_phase = motion
     limits = [(x, STANDING.moved * length_per_pixel), *((angle, STANDING.turned) for angle in (body_angle, tail_phase))]

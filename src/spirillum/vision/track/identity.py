@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
-from spirillum.vision.camera.optics import BodyPose, Optics, opposite, seen
+from spirillum.vision.camera.optics import BodyPose, Optics, opposite, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
@@ -103,7 +103,7 @@ def identify(
     standing = None if half else _standing(name, setup, stated, frames, still)
     if standing is not None and standing.robot:
         return standing
-    if standing is None and isinstance(found, InputError) and _nothing_moves(frames, still):
+    if standing is None and isinstance(found, InputError) and _is_noise_alone(frames, still):
         raise InputError(
             f"{name}: nothing moves in its pictures, and no robot like '{stated.robot.name}' stands in them: the tube "
             "seems to be empty; allowed: a robot in view, or one at rest with stripes and tail in view"
@@ -168,7 +168,7 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
     return striped
 
 
-def _nothing_moves(frames: list[Frame], still: Samples) -> bool:
+def _is_noise_alone(frames: list[Frame], still: Samples) -> bool:
     """Whether the frames differ from their background by noise alone."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     for frame in frames:
@@ -201,7 +201,7 @@ def _surroundings(body: BodyFinder, pose: BodyPose) -> tuple[int, int, int, int]
     ahead = (0.5 + STANDING.ahead) * robot.body.length
     behind = ahead + robot.coupling.length + robot.tail.length
     corners = [[x, y, 0.0] for x in (-behind, ahead) for y in (-beside, beside)]
-    pixels = seen(np.array(corners), pose, body.optics)
+    pixels = project(np.array(corners), pose, body.optics)
     if not np.isfinite(pixels).all():
         return 0, 0, 0, 0
     low = np.maximum(np.floor(pixels.min(axis=0)), body.bounds[:2]).astype(int).tolist()

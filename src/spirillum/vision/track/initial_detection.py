@@ -14,12 +14,12 @@ from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import least_squares_line
-from spirillum.vision.camera.optics import BodyPose, Optics, opposite, places_seen_by
+from spirillum.vision.camera.optics import BodyPose, Optics, opposite, positions_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import DETECTION, SEAL, VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places, most_likely, refined
-from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
+from spirillum.vision.track.size import OutlineFit, apparent_outline, clearness, resized
 from spirillum.vision.track.visibility import rivals_in, turned_flags
 from spirillum.vision.video.frames import Frame
 
@@ -145,7 +145,7 @@ class _Learnt(NamedTuple):
         return self.poses[len(self.poses) // 2]
 
 
-class _Found(NamedTuple):
+class _InitialDetection(NamedTuple):
     """The robot on some frames, before its edges are learnt."""
 
     body: BodyFinder
@@ -159,7 +159,7 @@ class _Found(NamedTuple):
 def detect_robot(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, colours: int = 0) -> Start:
     """Find the robot on frames spread over the video; learn its size, within a tenth, and what its edges look like."""
     focal = body.optics.focal
-    found = (_found_by_seal(body, frames, colours) if colours else None) or _by_outline(name, body, frames, still)
+    found = (_detect_by_seal(body, frames, colours) if colours else None) or _by_outline(name, body, frames, still)
     body, about = found.body, found.about
     learnt = _learnt(name, body, about)
     if body.colours:
@@ -189,7 +189,7 @@ def detect_robot(name: str, body: BodyFinder, frames: Sequence[Frame], still: Sa
     return Start(body, size, off, seen, path, learnt.score, found.clearness, found.rivals, found.flags, search)
 
 
-def _by_outline(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> _Found:
+def _by_outline(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> _InitialDetection:
     """Find the robot by the outline of its body."""
     every = np.unique(
         np.linspace(0, len(frames) - 1, min(DETECTION.searched, len(frames))).round().astype(int)
@@ -199,7 +199,7 @@ def _by_outline(name: str, body: BodyFinder, frames: Sequence[Frame], still: Sam
     found = _places(shape, images, still)
     if not _clear(found):
         turned = _places(shape, images, still, turn=np.pi)
-        if _clear(turned) and _goes_along(turned, body.robot.body.length):
+        if _clear(turned) and _is_one_object(turned, body.robot.body.length):
             side, other = body.optics.direction, opposite(body.optics.direction)
             raise InputError(
                 f"{name}: robot.direction = '{side}', but a robot like '{body.robot.name}' is seen with its nose on "
@@ -211,10 +211,10 @@ def _by_outline(name: str, body: BodyFinder, frames: Sequence[Frame], still: Sam
     rivals = rivals_in(body, [frames[k].image for k in every], found, chosen)
     flags = turned_flags(shape, images, still, found, chosen)
     known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
-    return _Found(body, _roughly(body, known, frames, still), clearness(found), rivals, flags, None)
+    return _InitialDetection(body, _roughly(body, known, frames, still), clearness(found), rivals, flags, None)
 
 
-def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _Found | None:
+def _detect_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _InitialDetection | None:
     """Find the robot by the colours of its seal; None where no block of colour has its size on most frames."""
     if not body.contour.seal.any():
         return None
@@ -249,7 +249,7 @@ def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _
         guesses = [next((one.pose for one in search.places(frame.image)), None) for frame in frames]
     rivals = _rivals_of_seal([frames[k] for k in seen], [found[k] for k in seen])
     about = _Learnt([frames[k] for k in seen], poses, float(best), [True] * len(seen))
-    return _Found(finder, about, clear, rivals, (), search)
+    return _InitialDetection(finder, about, clear, rivals, (), search)
 
 
 def _rivals_of_seal(frames: Sequence[Frame], found: Sequence[list[PoseCandidate]]) -> list[tuple[np.ndarray, BodyPose]]:
@@ -273,14 +273,14 @@ def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _L
     plain = BodyFinder(body.robot, body.optics, body.bounds, body.contour)
     found, start = plain.learn(images, learnt.poses, times), learnt.poses
     for _ in range(SEAL.moves):  # edges are learnt where the outline lies: compression shifts those of the seal
-        move = outline_seen(plain, found[len(found) // 2].pose).move
+        move = apparent_outline(plain, found[len(found) // 2].pose).move
         start = [BodyPose(*row) for row in (np.array(start) + np.array(move)).tolist()]
         found = plain.learn(images, start, times)
     if not all(one.known for one in found):
         return None
     other = learnt._replace(poses=[one.pose for one in found])
     apart = np.array(other.poses)[:, 0] - poses[:, 0]
-    outline = outline_seen(plain, other.typical)
+    outline = apparent_outline(plain, other.typical)
     settled = outline._replace(size=1.0).fits(pixel)  # it does not between the rims of a glass cover and a dark liner
     if not settled or abs(outline.size - size) > SEAL.agreement or float(np.std(apart)) > SEAL.apart * pixel:
         return None
@@ -290,7 +290,7 @@ def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _L
 def _outline_of(body: BodyFinder, learnt: _Learnt) -> OutlineFit:
     """Size and place of the body by its outline; its size by its seal where that is what is followed."""
     if not body.colours:
-        return outline_seen(body, learnt.typical)
+        return apparent_outline(body, learnt.typical)
     size = body.size_by_seal([frame.image for frame in learnt.frames], learnt.poses)
     return OutlineFit(size if abs(size - 1.0) > SEAL.size_tolerance else 1.0, BodyPose(0.0, 0.0, 0.0))
 
@@ -315,12 +315,12 @@ def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequ
     """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
     found = [close_place(frame, still, body, pose_on_path(known, frame.time)) for frame in frames]
     usual = float(np.quantile([one.score for one in found], 0.8))
-    found = _on_one_way(found, usual, body, frames, still)
+    found = _search_unclear_frames(found, usual, body, frames, still)
     clear = [(frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > DETECTION.faint * usual]
     return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual, [True] * len(clear))
 
 
-def _on_one_way(
+def _search_unclear_frames(
     found: list[PoseCandidate], usual: float, body: BodyFinder, frames: Sequence[Frame], still: Samples
 ) -> list[PoseCandidate]:
     """Search again, at the poses of clear frames, on those that are less clear: they may show clutter for the body."""
@@ -354,7 +354,7 @@ def _moved(body: BodyFinder, learnt: _Learnt, outline: OutlineFit, *, stated: bo
     """Where the outline lies, in front of a camera that shows it as large as it looks; a `stated` size is kept."""
     other = body if stated else resized(body, outline.size)
     moved = np.array(learnt.poses) + np.array(outline.move)
-    there = places_seen_by(other.optics, body.optics, moved[:, :2])
+    there = positions_seen_by(other.optics, body.optics, moved[:, :2])
     poses = [BodyPose(*row) for row in np.column_stack([there, moved[:, 2]]).tolist()]
     return other, _Learnt(learnt.frames, poses, learnt.score, learnt.whole)
 
@@ -365,7 +365,7 @@ def _clear(found: Sequence[list[PoseCandidate]]) -> bool:
     return float(np.mean(clear)) >= DETECTION.clear_share
 
 
-def _goes_along(found: Sequence[list[PoseCandidate]], length: float) -> bool:
+def _is_one_object(found: Sequence[list[PoseCandidate]], length: float) -> bool:
     """Whether what stands out is one thing that goes along, not clutter now here, now there."""
     places = np.array([(some[0].pose.x, some[0].pose.y) for some in found if some])
     bends = np.hypot(*np.diff(places, 2, axis=0).T) if len(places) > 2 else np.zeros(1)

@@ -13,7 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import background, bounds_of, sight_of
-from spirillum.vision.camera.optics import BodyPose, seen
+from spirillum.vision.camera.optics import BodyPose, project
 from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
@@ -113,7 +113,7 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
     if size < GLARE.veil_step:
         return None
     there, beside = float(along[place]), float(sides[0].mean())
-    u, v = seen(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
+    u, v = project(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
     sentence = (
         f"a reflection ({size:.0f} of 255 brighter) stands still at column {u:.0f}, row {v:.0f}: it hides edges, and "
         "the interval of the speed is wider; move or soften the lamp"
@@ -126,7 +126,7 @@ def _brightness(
 ) -> Samples | None:
     """Median brightness at points along the path of a robot, of 255, (n,); None where much of it is out of view."""
     grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
-    pixels = np.nan_to_num(seen(grid, pose, body.optics), nan=-1.0).round().astype(int)
+    pixels = np.nan_to_num(project(grid, pose, body.optics), nan=-1.0).round().astype(int)
     left, top, right, bottom = body.bounds
     inside = np.all((pixels >= (left, top)) & (pixels < (right, bottom)), axis=1).reshape(along.size, across.size)
     kept = inside.all(axis=1)
@@ -173,7 +173,7 @@ def _covered(body: BodyFinder, pose: BodyPose) -> Samples:
     nose = np.deg2rad([-90.0, -45.0, 0.0, 45.0, 90.0])
     x = np.concatenate([[rear], front + radius * np.cos(nose), [rear]])
     y = np.concatenate([[-radius], radius * np.sin(nose), [radius]])
-    return seen(np.column_stack([x, y, np.zeros(x.size)]), pose, body.optics)
+    return project(np.column_stack([x, y, np.zeros(x.size)]), pose, body.optics)
 
 
 def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
@@ -231,7 +231,7 @@ class InitialDetection(NamedTuple):
         """All that is odd about the robot so far, also about what was read since."""
         known = self.known
         doubtful = bool(self.glare.flags) or abs(known.size - 1.0) > SIZE.tolerance[0] or not known.robot
-        wire = known.wire.flags_beside(doubtful=doubtful)
+        wire = known.wire.flags_given_doubt(doubtful=doubtful)
         return (*known.start.flags, *known.flags, *known.stripes.flags, *wire, *self.glare.flags)
 
 

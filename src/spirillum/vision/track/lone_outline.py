@@ -18,7 +18,7 @@ from spirillum.arrays import Samples
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
-from spirillum.vision.camera.optics import BodyPose, Optics, seen
+from spirillum.vision.camera.optics import BodyPose, Optics, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import GROUPS
@@ -97,7 +97,7 @@ def _rim(profile: Samples, share: Samples, side: np.ndarray, core: float, outsid
 def _brightness(image: np.ndarray, pose: BodyPose, optics: Optics, along: Samples, across: Samples) -> Samples | None:
     """Brightness on a grid in the plane through the body's axis, of 255, (n, k); None where it is not all in view."""
     grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
-    pixels = np.nan_to_num(seen(grid, pose, optics), nan=-1.0).round().astype(int)
+    pixels = np.nan_to_num(project(grid, pose, optics), nan=-1.0).round().astype(int)
     if np.any(pixels < 0) or np.any(pixels >= (image.shape[1], image.shape[0])):
         return None
     grey = image[pixels[:, 1], pixels[:, 0]].mean(axis=1)
@@ -184,7 +184,7 @@ def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: Body
     across = radius * np.linspace(-LONE_OUTLINE.across, LONE_OUTLINE.across, LONE_OUTLINE.lines)
     foremost = max(poses, key=lambda pose: pose.x)
     grid = np.stack(np.meshgrid(np.arange(near, far, step), across, [0.0], indexing="ij"), axis=-1)
-    pixels = np.nan_to_num(seen(grid.reshape(-1, 3), foremost, body.optics), nan=-1.0).round().astype(int)
+    pixels = np.nan_to_num(project(grid.reshape(-1, 3), foremost, body.optics), nan=-1.0).round().astype(int)
     left, top, right, bottom = body.bounds
     inside = np.all((pixels >= (left, top)) & (pixels < (right, bottom)), axis=1)
     if inside.mean() < LONE_OUTLINE.in_view:

@@ -89,7 +89,7 @@ def restored_times(time: Samples, readings: tuple[FrameSeries, ...], picture: Pi
             lost += more
             if not more.any():
                 break
-    found = _put_back(time, readings, frame, lost, odd) if lost.any() else none
+    found = _restored_times(time, readings, frame, lost, odd) if lost.any() else none
     uneven = any(flag.spoils for flag in found.flags)
     many = None if uneven else _in_multiples(found.time, readings, frame)
     if many is not None and max(many.lost, many.repeated) > MULTIPLES.largest_share * many.steps:
@@ -117,7 +117,7 @@ def _in_multiples(time: Samples, readings: tuple[FrameSeries, ...], frame: float
     return next((one for one in found if one is not None), None)
 
 
-def _put_back(
+def _restored_times(
     time: Samples, readings: tuple[FrameSeries, ...], frame: float, lost: np.ndarray, odd: np.ndarray
 ) -> Restored:
     """Times with the losses that were found put back, or why nothing is given."""

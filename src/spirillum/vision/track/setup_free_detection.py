@@ -23,7 +23,7 @@ from spirillum.robust import mad_scale
 from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
 from spirillum.vision.camera.ruler import Lines
-from spirillum.vision.camera.scale import first_rotation, given_camera
+from spirillum.vision.camera.scale import camera_of_setup, first_rotation
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, SETUP_FREE
@@ -97,12 +97,12 @@ def detect_without_setup(
     looks = (2 if stills.changes else 1) * len(guesses) * len(directions)
     on_progress("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
-        found = _found_at(video, robot, (guess, lines, directions), stills)
+        found = _search_near_scale(video, robot, (guess, lines, directions), stills)
         for done, (direction, known) in enumerate(found, 1 + 2 * len(directions) * place):
             on_progress("looking for the robot", done, looks)
             if known is None:
                 continue
-            stripes = _stripes_seen(robot, known)
+            stripes = _observed_stripes(robot, known)
             if lines is None and not stripes and len(known.start.path) < SETUP_FREE.alone:
                 continue
             walls = _walls(stills.at(factor), known, lines)
@@ -191,7 +191,7 @@ def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: 
     return guesses + [guess for guess in wide if all(abs(np.log(guess / other)) > np.log(1.5) for other in guesses)]
 
 
-def _found_at(
+def _search_near_scale(
     video: Video, robot: Robot, guess: tuple[float, Lines | None, tuple[str, ...]], stills: _Stills
 ) -> Iterator[tuple[str, Identified | None]]:
     """Look for the robot near a guessed scale, in each direction; then at half to twice of it, if anything moves."""
@@ -199,7 +199,7 @@ def _found_at(
     pixel, lines, directions = guess
     for direction in directions:
         setup = _setup(robot, video.size, pixel, direction)
-        optics = given_camera(setup, video.size).optics
+        optics = camera_of_setup(setup, video.size).optics
         if lines is not None:
             optics = optics.moved({"rotation": first_rotation(optics, lines)})
         finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
@@ -248,7 +248,7 @@ def _by_seal(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, fact
     return None
 
 
-def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:
+def _observed_stripes(robot: Robot, known: Identified) -> tuple[str, ...]:
     """Colours of the stripes in the order seen: the file's own, else another one of the same colours."""
     reader = known.stripes
     own = reader.stripes
@@ -281,7 +281,7 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     way = np.array([np.cos(heading := float(np.median(poses[:, 2]))), np.sin(heading)])
     if lines is not None:
         along = 50.0 * np.array([[-np.cos(lines.roll), -np.sin(lines.roll)], [np.cos(lines.roll), np.sin(lines.roll)]])
-        first, last = optics.points(along + np.array(optics.middle), optics.axis_height)[:, :2]
+        first, last = optics.points(along + np.array(optics.picture_centre), optics.axis_height)[:, :2]
         way = (last - first) / np.linalg.norm(last - first)
     side = np.array([-way[1], way[0]])
     centre = np.median(poses[:, :2], axis=0)

@@ -104,7 +104,7 @@ class OutlineFit(NamedTuple):
         return bool(np.all(off <= SIZE.tolerance)) and (stated or bool(off[0] <= SIZE.found))
 
 
-def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
+def apparent_outline(body: BodyFinder, pose: BodyPose) -> OutlineFit:
     """Size and pose correction of the outline, by a grid search within 8 %, 3 pixels and 3 degrees."""
     # Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare
     # and shadows agree on no size, so that they do not bias the maximum.
@@ -172,8 +172,8 @@ def _doubtful_ruler(scale: Scale, size: float, off: float, spacing: float | None
         else f" (about markers.spacing = {1e3 * spacing / size:.3g} mm in place of {1e3 * spacing:.3g} mm would fit)"
     )
     sentence = (
-        f"body and tail both look {_told(size)} at this scale: spacing, heights or index of the setup, or the size of "
-        f"the robot, are wrong{would}: measure them again; "
+        f"body and tail both look {_describe_ratio(size)} at this scale: spacing, heights or index of the setup, or "
+        f"the size of the robot, are wrong{would}: measure them again; "
     )
     if off > SIZE.largest_difference:
         flag = Flag("size-does-not-fit", sentence + "no length and no speed is given", LENGTHS)
@@ -191,8 +191,8 @@ def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, rul
         why = "the tail says nothing of it" if np.isnan(tail) else "the tail agrees with neither"
         remedy = "where it lies on the body, measure spacing, heights and body again"
     sentence = (
-        f"the outline looks {_told(size)}, and {why}: it may follow the rim or the contents of a glass cover, or a "
-        f"grid behind it: look at the annotated video, and {remedy}; "
+        f"the outline looks {_describe_ratio(size)}, and {why}: it may follow the rim or the contents of a glass "
+        f"cover, or a grid behind it: look at the annotated video, and {remedy}; "
     )
     wider = scale if ruler else with_source(scale, "size of the body", off)
     if off > (SIZE.largest_difference if ruler else SIZE.unconfirmed):
@@ -203,7 +203,7 @@ def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, rul
     return CheckedScale(wider, (flag,), SIZE.roll_error * off)
 
 
-def _told(size: float) -> str:
+def _describe_ratio(size: float) -> str:
     """An apparent size over that of the robot file, in words."""
     if abs(np.log(size)) > SIZE.largest_difference:
         return f"{size:.3g} times as large as the robot file says"

@@ -19,7 +19,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale, running_median
-from spirillum.vision.camera.optics import seen
+from spirillum.vision.camera.optics import project
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.initial_detection import Start
@@ -116,7 +116,7 @@ def _rows_of(start: Start, factor: int) -> tuple[int, int]:
     sides = np.array([[0.0, -wide, 0.0], [0.0, wide, 0.0]])
     across = 0 if body.optics.upright else 1
     optics = body.shape(factor).optics
-    rows = [seen(sides, pose, optics)[:, across] for _, pose in start.path]
+    rows = [project(sides, pose, optics)[:, across] for _, pose in start.path]
     low, high = np.nanmin(rows) - STEADINESS.rows_beside, np.nanmax(rows) + STEADINESS.rows_beside
     return max(0, int(low)), max(0, int(high))
 

@@ -86,8 +86,8 @@ class FrameTracker:
         """Place the robot on the next frame, and read its stripes and tail."""
         start, record = self.known.start, self.record
         found = self._placed(frame, self._guess(frame.time))
-        if self._may_be_elsewhere(found):
-            found = self._found_again(frame, found)
+        if self._needs_full_search(found):
+            found = self._search_whole_picture(frame, found)
         stripes = self.known.stripes
         roll, edges = _UNREAD, np.asarray(np.full(len(stripes.stripes), np.nan))
         if found.known:
@@ -153,7 +153,7 @@ class FrameTracker:
         tried = [self._near(frame, pose) for pose in (guess, near, self.record.placed[-1].pose)]
         return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
-    def _may_be_elsewhere(self, found: PoseFit) -> bool:
+    def _needs_full_search(self, found: PoseFit) -> bool:
         """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do."""
         # It is searched for at once where they do so on a frame for the first time, then now and then.
         placed = self.record.placed
@@ -165,7 +165,7 @@ class FrameTracker:
         few = FOLLOWING.few_edges * median(self._shares)
         return found.share < few and (now_and_then or not placed[-1].known or placed[-1].share >= few)
 
-    def _found_again(self, frame: Frame, lost: PoseFit) -> PoseFit:
+    def _search_whole_picture(self, frame: Frame, lost: PoseFit) -> PoseFit:
         """Search the whole picture for the body; `lost` if it is not found where more of its edges fit."""
         least = FOLLOWING.more_edges * lost.share if lost.known else 0.0
         start = self.known.start

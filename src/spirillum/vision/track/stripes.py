@@ -12,19 +12,19 @@ from spirillum.arrays import Samples
 from spirillum.kernels.core import profile_of_rows, stripe_fit, stripes_at
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
-from spirillum.vision.camera.optics import BodyPose, Optics, seen
+from spirillum.vision.camera.optics import BodyPose, Optics, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.colours import (
+    are_distinguishable,
+    check_order,
     colour_classes,
+    initial_line_colours,
     is_single,
     named_rightly,
-    order_seen,
+    observed_width,
     pattern_period,
     runs_of,
-    seen_line,
-    told_apart,
-    width_seen,
     without_glare,
 )
 from spirillum.vision.track.constants import SINGLE_LINE, STRIPES
@@ -110,7 +110,7 @@ class Stripes:
         palettes = colour_classes(facing, self.names)
         start = palettes[1]
         seen_steep = np.where(steep[..., None], profiles, np.nan)
-        palette, verdict = order_seen(seen_steep, self.angles, palettes, self.stripes, self.names)
+        palette, verdict = check_order(seen_steep, self.angles, palettes, self.stripes, self.names)
         clear = without_glare(profiles, (palette, *palettes[1:]))
         even = np.zeros((self.angles.size, 3))
         self.appearance = self._refined(profiles, clear, scales, palette, even)
@@ -119,7 +119,7 @@ class Stripes:
             other = self._refined(profiles, clear, scales, start, even)
             loss = self._typical_loss(self._fits(profiles, scales, other))
             self.appearance, least = (other, loss) if loss < least else (self.appearance, least)
-        if not told_apart(facing, palettes):
+        if not are_distinguishable(facing, palettes):
             sentence = (
                 f"the seal does not show the colours {', '.join(self.names)}: what was learnt for them hardly differs; "
                 "the body's rotation is not given: check robot.stripes, or paint the stripes"
@@ -149,13 +149,13 @@ class Stripes:
 
     def _learn_line(self, profiles: Samples, scales: Samples, facing: np.ndarray) -> None:
         """Learn the appearance of a single line: from what moves, for a highlight stays where it is."""
-        line = seen_line(profiles, facing, self.order)
+        line = initial_line_colours(profiles, facing, self.order)
         if line is None:
             self.flags = (_line_flag("stripes-do-not-pass", "no painted line is seen to move over the seal"),)
             return
         self.appearance = self._refined(profiles, profiles, scales, line.palette, line.sheen)
         fits = self._fits(profiles, scales, self.appearance)
-        count = np.count_nonzero(self._told(fits))
+        count = np.count_nonzero(self._determined_frames(fits))
         contrast, first = (float(np.linalg.norm(np.diff(p, axis=0))) for p in (self.appearance.palette, line.palette))
         if count < SINGLE_LINE.frames:
             few = f"the painted line can be read on {count} of the {len(fits)} frames looked at"
@@ -181,7 +181,7 @@ class Stripes:
         if len(runs) != 1:
             return True
         stated = runs.pop()
-        return not abs(np.log(width_seen(profiles, self.angles, palettes, stated) / stated)) > STRIPES.width_range
+        return not abs(np.log(observed_width(profiles, self.angles, palettes, stated) / stated)) > STRIPES.width_range
 
     def _fits(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> Samples:
         """The results of `stripe_fit` on some frames, (f, 8)."""
@@ -190,10 +190,10 @@ class Stripes:
     def _typical_loss(self, fits: Samples) -> float:
         """Median over the frames of the loss relative to that of a uniform colour."""
         ratios = np.where(np.isfinite(fits[:, 0]), fits[:, 2] / fits[:, 4], 1.0)
-        told = ratios[self._told(fits)]
+        told = ratios[self._determined_frames(fits)]
         return float(np.median(told)) if told.size else 1.0
 
-    def _told(self, fits: Samples) -> np.ndarray:
+    def _determined_frames(self, fits: Samples) -> np.ndarray:
         """Mask of the frames that determine the angle: where one colour alone is in view, many angles fit alike."""
         if self.readable == 1.0:
             return np.ones(len(fits), dtype=bool)
@@ -238,7 +238,7 @@ class Stripes:
 
     def _profile(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
         """Colour profile along the angle, (n, 3), and pixels per radian, (n,); 0 where the surface faces away."""
-        ends = seen(self._surface, pose, self.optics).reshape(2, -1, 2)
+        ends = project(self._surface, pose, self.optics).reshape(2, -1, 2)
         first, last = self._between @ ends[0], self._between @ ends[1]
         along = self._slope @ (0.5 * (ends[0] + ends[1]))
         axis = (last - first).mean(axis=0)
@@ -296,7 +296,7 @@ class Stripes:
         sums, weights = np.zeros_like(appearance.palette), np.zeros(len(appearance.palette))
         models, wanted, good_at, residuals, squares = [], [], [], [], []
         fits = self._fits(profiles, scales, appearance)
-        losses = np.where(np.isfinite(fits[:, 0]) & self._told(fits), fits[:, 2] / fits[:, 4], np.inf)
+        losses = np.where(np.isfinite(fits[:, 0]) & self._determined_frames(fits), fits[:, 2] / fits[:, 4], np.inf)
         best = np.argsort(losses)[: max(3, int(0.8 * np.isfinite(losses).sum()))]
         shade, sheen = appearance.shade[:, :3], appearance.shade[:, 3:]
         for which in best[np.isfinite(losses[best])]:

@@ -12,7 +12,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.core import ridge_of, sampled, wave_fit, wave_scores
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
-from spirillum.vision.camera.optics import BodyPose, Optics, seen
+from spirillum.vision.camera.optics import BodyPose, Optics, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import TAIL
@@ -193,7 +193,7 @@ class TailWave:
             flags.append(Flag("handedness", sentence, _TAIL))
         return tuple(flags)
 
-    def flags_beside(self, *, doubtful: bool) -> tuple[Flag, ...]:
+    def flags_given_doubt(self, *, doubtful: bool) -> tuple[Flag, ...]:
         """Warnings, where the place of the body or the light may be the reason why the tail does not fit its file."""
         if not doubtful:
             return self.flags
@@ -223,7 +223,7 @@ class TailWave:
         return Flag("tail-unreadable", sentence, _TAIL)
 
     def _strip(self, pose: BodyPose) -> _Strip:
-        pixels = seen(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
+        pixels = project(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
         b = self.lift
         axis = pixels[:, 0]
         y = (pixels[:, 1] - pixels[:, 2]) / (2.0 * b)
@@ -330,10 +330,11 @@ class TailWave:
         own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
         if abs(_FACTORS[best] - 1.0) > 0.07 and scores[best] > 1.15 * own:
             spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
-            shape = self._seen_shape(few)
+            shape = self._apparent_shape(few)
             if shape is not None:
-                sentence = f"the tail does not look as the robot file says{self._told(shape)}: check the file; " + (
-                    "the tail's rotation is not given" if spoils else "its rotation is read all the same"
+                sentence = (
+                    f"the tail does not look as the robot file says{self._describe_difference(shape)}: check the file; "
+                    + ("the tail's rotation is not given" if spoils else "its rotation is read all the same")
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
             elif spoils:
@@ -354,7 +355,7 @@ class TailWave:
         scores = self.scores_by_wavelength(ridges, amplitude)
         return scores is not None and float(np.interp(1.0, _FACTORS, scores)) > own
 
-    def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
+    def _apparent_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
         """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen."""
         # Noise has a best-fitting shape too: on half of the frames the tail has to be readable in that shape.
         found = []
@@ -397,7 +398,7 @@ class TailWave:
         """The wave of a tail of another shape."""
         return np.asarray(self.wave * np.array([1.0 / shape.wavelength, 1.0 / shape.wavelength, 1.0, shape.amplitude]))
 
-    def _told(self, shape: _SeenShape) -> str:
+    def _describe_difference(self, shape: _SeenShape) -> str:
         """In words, how a shape differs from that of the robot file."""
         seen = []
         for name, least in (("wavelength", 0.07), ("amplitude", 0.0)):

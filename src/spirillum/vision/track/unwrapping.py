@@ -233,7 +233,7 @@ def _slope(time: Samples, value: Samples) -> tuple[float, float]:
     return rate, rate * float(t[-1] - t[0])
 
 
-def nothing_moves(motion: RobotMotion, robot: Robot) -> tuple[Flag, ...]:
+def static_object_flag(motion: RobotMotion, robot: Robot) -> tuple[Flag, ...]:
     """Flag an object that neither moves nor turns and has no tail: it may belong to the background."""
     time, x, body_angle, tail_phase = motion
     if time.size < UNWRAPPING.fewest_frames:

@@ -46,7 +46,7 @@ class Display(NamedTuple):
         share = max(1, round(stored[0] * self.aspect)) / stored[0]
         return (1.0, share) if self.transposed else (share, 1.0)
 
-    def shown(self, picture: np.ndarray) -> np.ndarray:
+    def display_picture(self, picture: np.ndarray) -> np.ndarray:
         """A stored 8-bit picture as it is shown."""
         height, stored = picture.shape[:2]
         width = max(1, round(stored * self.aspect))
@@ -147,6 +147,6 @@ def converter(display: Display) -> Callable[[Any], np.ndarray]:
     reformatter = av.video.reformatter.VideoReformatter()
 
     def rgb(frame: Any) -> np.ndarray:
-        return display.shown(reformatter.reformat(frame, format="rgb24").to_ndarray())
+        return display.display_picture(reformatter.reformat(frame, format="rgb24").to_ndarray())
 
     return rgb

@@ -26,10 +26,10 @@ from spirillum.vision.video.streams import (
     VIDEO,
     ImageSequence,
     Stated,
-    film_stream,
     frame_clock,
     image_folder,
     image_stack,
+    main_video_stream,
     one_line,
     open_container,
     short_reason,
@@ -315,7 +315,7 @@ def _film(path: Path, frames_per_second: float | None, aspect: float | None) -> 
     with open_container(path) as container:
         if not container.streams.video:
             raise InputError(f"{path} has no pictures; allowed: {VIDEO}")
-        stream, flags = film_stream(container)
+        stream, flags = main_video_stream(container)
         if stream.codec_context is not None and stream.width and stream.height:
             _check_size(path, (stream.width, stream.height))
         stated = stated_length(container, stream)
@@ -369,7 +369,7 @@ def _images(path: Path, frames_per_second: float | None, aspect: float | None) -
 
 def _threaded(container: Any) -> Any:
     """The stream that is measured, decoded by several threads."""
-    stream, _ = film_stream(container)
+    stream, _ = main_video_stream(container)
     stream.thread_type = "AUTO"
     return stream
 

@@ -57,7 +57,7 @@ def open_container(path: Path) -> Any:
         raise InputError(f"{path} cannot be read as a film ({short_reason(error)}); allowed: {VIDEO}") from error
 
 
-def film_stream(container: Any) -> tuple[Any, list[Flag]]:
+def main_video_stream(container: Any) -> tuple[Any, list[Flag]]:
     """The longest stream of pictures that is no thumbnail, and a flag where several are videos."""
     # Of streams that are about as long, the largest pictures are taken, else the first.
     av = import_optional("av", "measuring a video", "video")
@@ -211,7 +211,7 @@ class ImageSequence:
             yield self._shown(picture)
 
     def _shown(self, picture: np.ndarray | None) -> np.ndarray | None:
-        return None if picture is None else self.display.shown(eight_bit(picture, self.bits)[:, :, ::-1])
+        return None if picture is None else self.display.display_picture(eight_bit(picture, self.bits)[:, :, ::-1])
 
 
 def image_folder(path: Path, aspect: float | None) -> ImageSequence:
