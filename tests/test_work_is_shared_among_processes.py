@@ -80,3 +80,21 @@ def test_a_process_beside_needs_a_free_core(monkeypatch: pytest.MonkeyPatch, bus
     with worker_pool.process_beside(os.getpid) as beside:
         assert (beside is None) is busy
         assert beside is None or beside.submit(os.getpid).result() != os.getpid()
+
+
+def test_an_interrupt_waits_until_a_process_has_what_it_starts_from() -> None:
+    waited = []
+
+    def started() -> None:
+        with worker_pool._start_of_processes():
+            os.kill(os.getpid(), signal.SIGINT)  # any thread may take it
+            time.sleep(0.02)
+            waited.append(True)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            started()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert waited == [True]

@@ -22,7 +22,7 @@ from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from statistics import fmean
-from threading import Lock, Thread
+from threading import Lock, Thread, current_thread, main_thread
 from time import monotonic, perf_counter, thread_time
 from types import ModuleType
 from typing import Any, Generic, TypeVar
@@ -145,17 +145,26 @@ def _end_with_parent() -> None:
 def _start_of_processes() -> Iterator[None]:
     """Tasks are handed to the pool here, and any of them may start a process."""
     # It does not run the caller's script again, for what it does is in this package; and it never sees Ctrl-C, which a
-    # terminal sends to it too: its parent ends it.
+    # terminal sends to it too: its parent ends it. The parent sees Ctrl-C once the process has what it starts from;
+    # blocking the signal in this thread is not enough for that, as another thread may take it.
     own = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     held = hasattr(signal, "pthread_sigmask")  # not on Windows
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if held else set()
+    caught: list[int] = []
+    handler = signal.getsignal(signal.SIGINT) if current_thread() is main_thread() else None
+    if handler is not None:
+        signal.signal(signal.SIGINT, lambda number, _frame: caught.append(number))
     try:
         yield
     finally:
         sys.modules["__main__"] = own
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
         if held:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if caught and callable(handler):
+            handler(signal.SIGINT, None)
 
 
 ESTIMATE = "estimate: "  #: Prefix of a progress message that estimates the work: a command prints it on its own line.

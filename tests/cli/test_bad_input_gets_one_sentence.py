@@ -25,6 +25,7 @@ WIDE = "biorob2012-wide"
         (["predict", ""], "robot = ''; allowed: a preset"),
         (["predict", WIDE, "--plot", ""], "--plot '' is empty; allowed: --plot FILE"),
         (["settle", WIDE, "-o", "a.png", "--plot", "b.png"], "is given twice; allowed: one FILE"),
+        (["predict", WIDE, "--tail-rate", "1Hz", "--tail-rate=2Hz"], "--tail-rate is given twice; allowed: one RATE"),
         (["predict", WIDE, "--plot", "a\x01b.png"], r"'a\x01b.png' holds a control character"),
         (
             ["compare-models", WIDE, "--model", "rft", "--plot", "a.png"],

@@ -26,17 +26,18 @@ _NUMBER = re.compile(r"[\d.+-]+")  # also in digits of other scripts
 class InterruptibleCommand(TyperCommand):
     """A command whose sentence on an interrupt says what is kept, where what was interrupted does not.
 
-    It refuses an empty name of a file, and a number in other digits than 0 to 9, by the option's name.
+    It refuses an option that is given twice, an empty name of a file, and a number in other digits than 0 to 9, by the
+    option's name.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Return the arguments that no parameter takes."""
         takes = {name: one for one in self.params if not getattr(one, "is_flag", True) for name in one.opts}
         split = [part for text in args for part in (text.split("=", 1) if text.startswith("--") else [text])]
-        written = [takes[name] for name in split if name in takes and takes[name].metavar in _PATHS]
-        for one in written:
-            if written.count(one) > 1 and not one.multiple:
-                raise InputError(f"{' or '.join(one.opts)} is given twice; allowed: one {one.metavar}")
+        given = [takes[name] for name in split if name in takes]
+        for one in given:
+            if given.count(one) > 1 and not one.multiple:
+                raise InputError(f"{' or '.join(one.opts)} is given twice; allowed: one {one.metavar or 'value'}")
         for name, value in pairwise(split):
             if name in takes and not value.strip() and (kind := takes[name].metavar) in _PATHS:
                 raise InputError(f"{name} {value!r} is empty; allowed: {name} {kind}")

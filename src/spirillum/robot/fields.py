@@ -188,8 +188,11 @@ _OTHERWISE = {
     "tail.pitch": "tail.wavelength is the pitch of the helix, a length",
     "tail.radius": "tail.amplitude is the radius of the helix's centreline",
     "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
+    **dict.fromkeys(("extends", "body", "coupling", "fluid"), "it belongs in a robot file"),
+    **dict.fromkeys(("robots", "vary", "models"), "it belongs in a study file"),
+    "markers": "it belongs in a setup file",
 }
-"""Derived quantities that are no fields of a robot file, and their remedies."""
+"""Derived quantities that are no fields of a robot file, and fields of other files, with their remedies."""
 _IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' reverses the tail's rotation"}
 """Remedies for out-of-range numbers whose meaning is expressed by another field."""
 _LONGEST_FIELD = 200  # characters of a field's name in a sentence, so that what is allowed has room
