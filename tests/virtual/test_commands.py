@@ -85,8 +85,6 @@ def test_a_film_is_of_a_robot_that_is_named_or_of_a_run(run: Run, tmp_path: Path
                 "1mm/s",
                 "--body-rate",
                 "1Hz",
-                "--tail-rate",
-                "1Hz",
                 "--friction",
                 "body",
             ),
