@@ -74,7 +74,7 @@ def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:
     """Display of a video's frame, and the angle by which its display matrix is off a quarter turn, rad."""
     # The matrix maps stored to shown coordinates: x' = a x + c y, y' = b x + d y, y downwards.
     try:
-        matrix = next((data for data in frame.side_data if data.type.name == "DISPLAYMATRIX"), None)
+        matrix = frame.side_data.get("DISPLAYMATRIX")
     except ValueError:  # side data of a kind that PyAV does not know hide all others
         return Display(aspect, *_QUARTERS[round(frame.rotation / 90.0) % 4]), 0.0
     if matrix is None:

@@ -51,8 +51,10 @@ UNSTATED = Stated(None, 0, _LOOSE)  #: Length of a video whose file states none.
 def open_container(path: Path) -> Any:
     """A video's file, opened by PyAV."""
     av = import_optional("av", "measuring a video", "video")
+    before_19 = int(av.__version__.partition(".")[0]) < 19  # from there on it decodes metadata of any encoding
+    more = {"metadata_errors": "replace"} if before_19 else {}
     try:
-        return av.open(f"file:{path}", options=_OPENING, metadata_errors="replace")
+        return av.open(f"file:{path}", options=_OPENING, **more)
     except (av.error.FFmpegError, ValueError, OSError) as error:
         raise InputError(f"{path} cannot be read as a film ({short_reason(error)}); allowed: {VIDEO}") from error
 
