@@ -61,9 +61,8 @@ def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.Fi
     content = BytesIO()
     with _hdf5()(content, "w", track_order=True) as stored, h5netcdf.File(stored, "w") as file:
         yield file
-    with atomic_write(path, replace=replace) as temporary:
-        with content.getbuffer() as whole:
-            temporary.write_bytes(whole)
+    with atomic_write(path, replace=replace) as temporary, content.getbuffer() as whole:
+        temporary.write_bytes(whole)
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, *, replace: Replace = "own") -> None:
