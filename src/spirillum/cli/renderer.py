@@ -61,7 +61,7 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
 
 
 def _left_line(notes: Sequence[Note], shown: Sequence[Note]) -> str:
-    """What an answer has beside the cautions that are shown: codes of other cautions, and how to read all."""
+    """Return the last line of an answer: codes of cautions that are not shown, and how to read all notes."""
     above = {note.code for note in shown}
     others = dict.fromkeys(note.code for note in notes if note.severity == "caution" and note.code not in above)
     also = f"{counted(len(others), 'more caution')} ({', '.join(others)}) and " if others else ""

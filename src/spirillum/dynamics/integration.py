@@ -39,7 +39,7 @@ class Event(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """What ends a run, or its drive; by default nothing does."""
+    """Limits that end a run or its drive; by default there are none."""
 
     nose: float = 0.0  #: Position of the nose's tip on the motor axis, m.
     tip: float = 0.0  #: Position of the tail's tip, m.
@@ -179,7 +179,7 @@ def run_sizes(robot: FreeRobot) -> Samples:
 
 
 def observed_at(robot: FreeRobot, state: Samples) -> Samples:
-    """What is observed in one state, (13,), or (31,) in a tube."""
+    """Return the observed quantities of one state, (13,), or (31,) in a tube."""
     return np.asarray(robot.observe(np.zeros(1), state[None])[0])
 
 

@@ -407,7 +407,7 @@ class TrialRequest:
         return TRIAL_DURATION if self.duration is None else self.duration
 
     def _shared(self) -> dict[str, Any]:
-        """What both released motions take of the request, with the resolution, which a run refuses: its reason."""
+        """Arguments that both released motions share, and the resolution, with which a run is refused."""
         robot = with_resolution(self.robot, self.resolution, WALLED)
         return {name: getattr(self, name) for name in ("friction", "placement", "roughness")} | {"robot": robot}
 

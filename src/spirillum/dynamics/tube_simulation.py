@@ -76,7 +76,7 @@ def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
         pairs["mean flow at its end"] = (float(numbers_of(before, "mean_flow")[-1]), flow)
     for what, (then, now) in pairs.items():
         if not _equal_values(then, now):
-            return f"{what} {_said(then)}, and not {_said(now)}"
+            return f"{what} {_as_text(then)}, and not {_as_text(now)}"
     fields = _other_fields(robot_of(before).model_dump(), steady.robot.model_dump())
     return f"another {fields[0]}" if fields else ""
 
@@ -106,7 +106,7 @@ def _equal_values(then: Any, now: Any) -> bool:
     return bool(then == now)
 
 
-def _said(value: str | float) -> str:
+def _as_text(value: str | float) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 

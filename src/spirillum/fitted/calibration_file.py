@@ -177,7 +177,7 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
     if robot.channel is None or robot.motor is None or not entries:
         return None, ()
     diameter = robot.channel.diameter
-    near = [entry for entry in entries if _equal_values(diameter, entry.channel_diameter)]
+    near = [entry for entry in entries if _is_same_size(diameter, entry.channel_diameter)]
     own = [entry.effective for entry in near if _is_of(robot, entry)]
     return own[0] if own else None, tuple(entry.effective for entry in near)
 
@@ -185,11 +185,11 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
 def placement_in(file: CalibrationFile, robot: Robot) -> Placement | None:
     """Pose of a robot in its channel by a calibration; None where the file has none for that channel."""
     diameter = robot.channel.diameter if robot.channel else float("inf")
-    own = [place.placement for place in file.placement if _equal_values(diameter, place.channel_diameter)]
+    own = [place.placement for place in file.placement if _is_same_size(diameter, place.channel_diameter)]
     return own[0] if own else None
 
 
-def _equal_values(value: float, fitted: float) -> bool:
+def _is_same_size(value: float, fitted: float) -> bool:
     return abs(value - fitted) <= _SAME * fitted
 
 
@@ -222,7 +222,7 @@ def _is_of(robot: Robot, entry: FittedFriction) -> bool:
         (robot.tail.wavelength, entry.wavelength),
         (robot.tail.amplitude, entry.amplitude),
     )
-    return all(_equal_values(value, fit) for value, fit in pairs)
+    return all(_is_same_size(value, fit) for value, fit in pairs)
 
 
 _FIELDS = {

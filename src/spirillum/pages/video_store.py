@@ -40,7 +40,7 @@ def plain_names(folder: Path) -> Iterator[None]:
 
 
 def read_upload(content: bytes, name: str, read: Callable[[Path], _Read]) -> _Read:
-    """What is read of an uploaded file; messages of errors call it the file."""
+    """Content of an uploaded file; error messages call it the file."""
     with scratch_folder() as folder:
         path = folder / name
         path.write_bytes(content)

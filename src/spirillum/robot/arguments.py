@@ -120,7 +120,7 @@ def one_of(*allowed: str) -> Callable[[Any], Any]:
     return check
 
 
-_DEEPEST = 24  # nested tables up to which fields are told apart: no robot file has more
+_DEEPEST = 24  # nesting of tables up to which fields are distinguished: no robot file has more
 
 
 def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
 
 
 def _over_poses(answer: Answer, column: str) -> str:
-    """What the pose of a value is, and over which poses its band is."""
+    """Return the pose of a value, and the range of poses of its band."""
     pose = answer["placement"]
     given = f"{column}: at a fixed pose ({', '.join(f'{name} {in_words(pose[name])}' for name in ('gap', 'pitch'))})"
     if "band" not in answer:

@@ -11,7 +11,7 @@ LEVEL = "no table of this tube: the flow is solved for"
 OF_A_RUN = "the flow at a moment of a run: it is solved for"
 """How messages begin that are to be read, too; the second only where the answer is not there at once."""
 SOLUTION = {LEVEL: (3.0, 15.0), TILTED: (10.0, 40.0), OF_A_RUN: (60.0, 180.0)}
-"""What a fast and a slow core need for each, s."""
+"""Time of each on a fast and on a slow core, s."""
 
 
 def time_span(least: float, most: float) -> str:
