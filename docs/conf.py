@@ -38,6 +38,7 @@ if smartquotes:
     extensions.append("sphinx.ext.viewcode")
 else:  # listings take longest; none of these can hold a warning
     logging.disable(logging.DEBUG)
+    autodoc_typehints = "none"  # types in signatures, which nobody reads here: a quarter of the time
     Parser.parse_definition = lambda _self: None  # lines of definitions are for listings, and take a fifth of the time
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build"]
