@@ -40,7 +40,15 @@ def test_every_code_is_explained_and_every_explained_code_is_used() -> None:
     own = set(KINDS) - set(TRACKING)
     computed = {"inertia", "outside-validity", "remark", "misfit", "intervals-incomplete"}
     assert own - computed <= used | {"outlier"}
-    assert {code for code, _ in literals("Flag")} <= set(TRACKING)
+    for row in rows_of("vision/flags.csv"):
+        for part, what in (("body", "stripes"), ("tail", "tail")):
+            code = (row["code"] or row["name"]).format(part=part, what=what, rate="forward-velocity")
+            assert Note(code, "").code in KINDS
+
+
+def test_every_flag_of_the_table_is_raised() -> None:
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    assert [row["name"] for row in rows_of("vision/flags.csv") if f'"{row["name"]}"' not in text] == []
 
 
 def test_sentences_are_short() -> None:

@@ -6,9 +6,10 @@ import pytest
 from spirillum.robot.load import load
 from spirillum.vision.camera.optics import BodyPose, optics_of
 from spirillum.vision.camera.scale import Scale
+from spirillum.vision.flag import LENGTHS
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.size import LENGTHS, checked_scale
+from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.tail import TailWave
 
 pytest.importorskip("cv2")

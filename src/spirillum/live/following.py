@@ -40,7 +40,6 @@ from spirillum.vision.track.steadiness import StillPicture, shift_of, view_of
 from spirillum.vision.track.steps import FrameTracker
 from spirillum.vision.track.track import CUES, RobotMotion
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, static_object_flag, unwrapped
-from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 
@@ -111,13 +110,7 @@ class CameraWatch:
             self._first = now
             return ()
         shift, moved = shift_of(self._first, now)
-        if not moved:
-            return ()
-        sentence = (
-            f"the camera or the ruler was moved: the picture lies {abs(shift):.1f} pixels along the channel from where "
-            "it lay when the robot was learnt; nothing is given: begin anew"
-        )
-        return (Flag("camera-moved", sentence, EVERYTHING),)
+        return (Flag.named("camera-moved-live", shift=abs(shift)),) if moved else ()
 
 
 _CHECKED = 1.0  # time between two looks at the last seconds for what is odd, s
@@ -250,8 +243,7 @@ class Following:
         found = evened(body, roll, error, edges, self.body.period)
         if not {flag.name for flag in found.flags} & {"uneven-stripes", "stripes-do-not-fit"}:
             return ()
-        sentence = "the stripes are uneven: the body's angle and rate are not given frame by frame, but over all frames"
-        return (Flag("uneven-stripes", sentence, (_BODY,)),)
+        return (Flag.named("uneven-stripes-live"),)
 
     def _rates(self, body_error: float, tail_error: float) -> dict[str, Measured]:
         slopes = {name: window.slope(LEVEL) for name, window in self.windows.items()}

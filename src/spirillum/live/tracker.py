@@ -18,11 +18,11 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.camera.camera import opened, samples_of
+from spirillum.vision.flag import EVERYTHING
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.constants import SEAL
 from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.lone_outline import check_outline
-from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.video.frames import Frame, Video
 
 _SAMPLES = 24  # frames from which the robot is learnt, as for a video

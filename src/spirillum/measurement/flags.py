@@ -53,13 +53,8 @@ class Elongation(NamedTuple):
         if not self.clear:
             return ()
         how = "drift apart" if self.change > 0.0 else "draw together"
-        size = f"{1e3 * abs(self.change):.2g} mm ({abs(self.change) / self.pixel:.2g} pixels)"
-        sentence = (
-            f"nose and rear of the body {how} by {size} during the video, as where the nose rises or sinks: the speed "
-            "of the body's middle may be off by up to twice that over the video, and its interval is as wide; film a "
-            "robot that has settled, or one that swims further"
-        )
-        return (Flag("ends-drift-apart", sentence),)
+        far = abs(self.change)
+        return (Flag.named("ends-drift-apart", how=how, length=1e3 * far, pixels=far / self.pixel),)
 
 
 def elongation_of(track: Track) -> Elongation:
@@ -112,8 +107,7 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
     count = track.time.size
     if count < _FEWEST_FRAMES and not {BY_HAND, IMPORTED} & names:
         frames = "1 frame was" if count == 1 else f"{count} frames were"
-        few = f"only {frames} measured; a rate needs at least {_FEWEST_FRAMES}"
-        flags.insert(0, Flag("too-few-frames", few, SEEN))
+        flags.insert(0, Flag.named("too-few-frames", frames=frames, least=_FEWEST_FRAMES))
         implied |= _FOLLOWING
     return tuple(flag for flag in flags if flag.name not in implied)
 
@@ -123,37 +117,25 @@ def _mirrored(flags: list[Flag]) -> list[Flag]:
     reversed_order = any(flag.name == "stripe-order" and "reversed" in flag.sentence for flag in flags)
     if not reversed_order or all(flag.name != "handedness" for flag in flags):
         return []
-    sentence = (
-        "stripes and tail both run the other way round than the robot file says, as in a mirrored picture; neither "
-        "rotation is given: mirror the film back, or, if it is not mirrored, correct robot.stripes and tail.handedness"
-    )
-    return [Flag("mirrored", sentence, ("body_rotation_rate", "tail_rotation_rate"))]
+    return [Flag.named("mirrored")]
 
 
 def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Flag]:
     flags = []
     if says_synthetic(track.words):
-        flags.append(Flag(SYNTHETIC, "the video says of itself that it is synthetic: nothing here is measured"))
+        flags.append(Flag.named(SYNTHETIC))
     for name in SEEN:
-        rate, words = fits[name], name.replace("_", " ")
+        rate, both = fits[name], {"rate": name.replace("_", "-"), "words": name.replace("_", " ")}
         if not rate.measured:
             continue
         if not rate.steady:
-            sentence = f"the {words} changes along the video{_how(rate, name)}; given is its mean from end to end"
-            flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
+            flags.append(Flag.named("not-steady", how=_how(rate, name), **both))
         if rate.outliers > max(_FEW_OUTLIERS, _MANY_OUTLIERS * (rate.frames + rate.outliers)):
-            sentence = f"{rate.outliers} frames lie far from their neighbours and were left out of the {words}"
-            flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
+            flags.append(Flag.named("stray-frames", count=rate.outliers, **both))
     stripes = stripes_of(track.setup, robot)
     turned = _range(track.body_angle)
     if stripes and fits["body_rotation_rate"].measured and turned < 2 * np.pi / len(stripes):
-        flags.append(
-            Flag(
-                "short-turn",
-                f"the body turned by {math.degrees(turned):.3g} deg, less than one stripe: errors that come back with "
-                "every stripe cannot be seen, so their usual size widens the interval of its rate",
-            )
-        )
+        flags.append(Flag.named("short-turn", turned=math.degrees(turned)))
     return flags
 
 

@@ -67,7 +67,7 @@ def read_track(
     nothing = np.full(frame.size, np.nan)
     error = nothing + _POINT_ERROR * ruled.scale.length_per_pixel
     middle = np.where(both[:, None], 0.5 * (nose + rear), centre)
-    flag = Flag(IMPORTED, f"the positions are another program's, from {path.name}; it has no angles of body and tail")
+    flag = Flag.named(IMPORTED, table=path.name)
     return Track(
         time=time[inside], frame=frame[inside], position=position[inside],
         heading=np.where(both, np.arctan2(along[:, 1], along[:, 0]), np.nan)[inside],
@@ -233,13 +233,12 @@ def check_track(track: Track, table: Path, video: Path, setup: Setup, robot: Rob
         )
         if known.whole:
             raise InputError(f"{sentence}; allowed: {_PIXELS}")
-        return (Flag("track-beside-the-robot", f"{sentence}: the positions have to be {_PIXELS}"),)
+        return (Flag.named("track-beside-the-robot", sentence=sentence, pixels=_PIXELS),)
     return _otherwise(table, time, stated, found[:, :2].mean(axis=1))
 
 
 def _unchecked(table: Path, why: str) -> Flag:
-    sentence = f"{table.name} was not compared with the pictures ({why}): its positions have to be {_PIXELS}"
-    return Flag("track-not-checked", sentence)
+    return Flag.named("track-not-checked", table=table.name, why=why, pixels=_PIXELS)
 
 
 def _covered(time: float, times: Samples) -> bool:
@@ -261,8 +260,5 @@ def _otherwise(table: Path, time: Samples, stated: Samples, found: Samples) -> t
     one, other = (np.polyfit(time - time.mean(), values, 1)[0] for values in (stated, found))
     if span * np.hypot(*other) < _SMALL or np.hypot(*(one - other)) < _OTHERWISE * np.hypot(*other):
         return ()
-    sentence = (
-        f"{table.name} moves by {span * np.hypot(*one):.1f} pixels where the robot in the picture moves by "
-        f"{span * np.hypot(*other):.1f}: its positions have to be {_PIXELS}, and its frames those of the video"
-    )
-    return (Flag("track-moves-otherwise", sentence),)
+    ways = {"stated": span * np.hypot(*one), "found": span * np.hypot(*other)}
+    return (Flag.named("track-moves-otherwise", table=table.name, pixels=_PIXELS, **ways),)

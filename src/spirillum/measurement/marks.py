@@ -224,7 +224,7 @@ def track_of_marks(
         position_error=click, body_angle_error=angle_error, tail_phase_error=angle_error,
         picture=picture, size=ruled.size if ruled else (0, 0), scale=scale, setup=setup, video=video,
         flags=(
-            Flag(BY_HAND, f"{_all_readings(inside.size)} taken by hand, from {marks.path.name}"),
+            Flag.named(BY_HAND, readings=_all_readings(inside.size), table=marks.path.name),
             *_unwrapped_flag(marks),
         ),
     )  # fmt: skip
@@ -241,11 +241,7 @@ def _unwrapped_flag(marks: Marks) -> tuple[Flag, ...]:
     if not marks.counted:
         return ()
     verb = "was" if len(marks.counted) == 1 else "were"
-    sentence = (
-        f"{' and '.join(marks.counted)} {verb} read within a turn, and counted on the shorter way between readings: "
-        "the rate is right only if less than half a turn passed between them"
-    )
-    return (Flag("counted-within-a-turn", sentence),)
+    return (Flag.named("counted-within-a-turn", what=f"{' and '.join(marks.counted)} {verb}"),)
 
 
 def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
@@ -265,7 +261,7 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
         known = np.isfinite(by_hand)
         angle[index[known]] = _nearest_turn(track.time, angle, index[known], by_hand[known])
         error[index[known]] = _ANGLE_ERROR
-    flag = Flag("corrected-by-hand", f"{frames} by hand, from {marks.path.name}")
+    flag = Flag.named("corrected-by-hand", frames=frames, table=marks.path.name)
     return replace(
         track, position=position, body_angle=body, tail_phase=tail, position_error=errors[0],
         body_angle_error=errors[1], tail_phase_error=errors[2], flags=(*track.flags, flag),

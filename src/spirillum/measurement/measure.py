@@ -95,11 +95,8 @@ def compared(trials: Sequence[Trial]) -> list[Trial]:
         worst = outlying_trial([trial.quantities[name].value for trial in trials])
         if worst is None:
             continue
-        sentence = (
-            f"its {name.replace('_', ' ')} does not fit in with the other trials (Grubbs' test, {100 * GRUBBS_LEVEL:g} "
-            "%); it still counts in the means"
-        )
-        found[worst] = found[worst].flagged(Flag(f"outlier-{name.replace('_', '-')}", sentence))
+        both = {"rate": name.replace("_", "-"), "words": name.replace("_", " ")}
+        found[worst] = found[worst].flagged(Flag.named("outlier", level=100 * GRUBBS_LEVEL, **both))
     return found
 
 
@@ -109,10 +106,7 @@ def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
     twin = next((other for other in others if np.array_equal(other.track.position[:, 0], x, equal_nan=True)), None)
     if twin is None or not np.isfinite(x).any():
         return trial
-    sentence = (
-        f"it shows the same as {twin.name}, frame by frame: a copy is no second trial, yet it counts in the means"
-    )
-    return trial.flagged(Flag("copy-of-a-trial", sentence))
+    return trial.flagged(Flag.named("copy-of-a-trial", name=twin.name))
 
 
 Progress = Callable[[str, int, int], None]
@@ -296,8 +290,7 @@ def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: Measurem
     track = track_of_marks(marks, asked.setup, path.name, seen.ruled, seen.time_of)
     if seen.seen:
         return track
-    unseen = Flag("no-video", f"{path.name} cannot be opened: the readings are taken as they are")
-    return replace(track, flags=(*track.flags, unseen))
+    return replace(track, flags=(*track.flags, Flag.named("no-video", video=path.name)))
 
 
 def measurement_of(

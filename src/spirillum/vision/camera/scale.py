@@ -157,13 +157,7 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
         sources[name] = abs(fit.response(longer, shorter)) / (2.0 * _STEP) * spread
     flags = []
     if lens is not None and abs(lens.focal / optics.focal - 1.0) > 0.02 + 3.0 * lens.focal_error / lens.focal:
-        flags.append(
-            Flag(
-                "focal-lengths-differ",
-                f"the checkerboard gives a focal length of {lens.focal:.1f} pixels, the ruler one of "
-                f"{optics.focal:.1f}: heights, spacing or index are not as the setup says, or the lens was refocused",
-            )
-        )
+        flags.append(Flag.named("focal-lengths-differ", board=lens.focal, ruler=optics.focal))
     return CalibratedCamera(
         optics, Scale(optics.length_per_pixel, _total(sources), sources, lines.lines, residual), tuple(flags)
     )

@@ -29,7 +29,7 @@ from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection, learnt_from
 from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
-from spirillum.vision.track.size import LENGTHS, AlignedTrack, align_with_path, checked_scale
+from spirillum.vision.track.size import AlignedTrack, align_with_path, checked_scale
 from spirillum.vision.track.steadiness import PictureSteps, camera_flags, picture_steps
 from spirillum.vision.track.steps import FrameDetection, FrameTracker, Record
 from spirillum.vision.track.track import CUES, Agreement, RobotMotion, Track, agreement_of
@@ -50,8 +50,6 @@ class SwayConstants:
     """Step of the robot against the background from which on pictures were not moved back well, pixels.
 
     A ruler's lines are at least three pixels apart, by which a wrong registration is off."""
-    lateral: tuple[str, ...] = ("lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
-    """Quantities that are not given then either."""
 
 
 SWAY = SwayConstants()
@@ -76,18 +74,10 @@ def swayed_by(still: Steadied, motion: RobotMotion, setup: Setup, sight: Calibra
     speed = math.hypot(*(float(least_squares_line(still.times, part).slope) for part in (right, down)))
     reach = max(float(np.ptp(right)), float(np.ptp(down)))
     jump = _largest_jump(motion.time, motion.x) / pixel
-    sentence = (
-        f"the camera swayed by {reach:.1f} pixels from end to end: all pictures were moved to where the first lies, "
-        "by what stands still in them; put the camera on a stand to be sure"
-    )
-    drift, flags = abs(parallax) * speed * pixel, [Flag("camera-swayed", sentence)]
+    flags = [Flag.named("camera-swayed", reach=reach)]
     if jump > SWAY.jump:
-        words = (
-            f"the camera swayed, and the robot jumps by {jump:.1f} pixels against what stands still: the pictures "
-            "could not be moved back well enough; no speed is given: put the camera on a stand"
-        )
-        flags.append(Flag("camera-moved", words, ("forward_velocity", "lateral_position", *SWAY.lateral)))
-    return Swayed(drift, tuple(flags))
+        flags.append(Flag.named("pictures-not-moved-back", jump=jump))
+    return Swayed(abs(parallax) * speed * pixel, tuple(flags))
 
 
 def _largest_jump(time: Samples, x: Samples) -> float:
@@ -101,28 +91,6 @@ def _largest_jump(time: Samples, x: Samples) -> float:
     windows = np.lib.stride_tricks.sliding_window_view(rest, wide)
     middle = np.median(windows, axis=1)
     return float(np.abs(middle[wide:] - middle[:-wide]).max())
-
-
-_DOUBTFUL_STRIPES = Flag(
-    "stripes-do-not-fit",
-    "the stripes seem uneven on a body that is not as large as it should be, which may be the reason; the body's "
-    "rotation is not given: look at the annotated video for its outline",
-    ("body_rotation_rate",),
-)
-
-_DOUBTFUL_SCALE = Flag(
-    "scale-does-not-fit",
-    "neither the body's size nor the widths of its stripes are as they should be at this scale: another outline may be "
-    "taken for the body's, and no length is given; correct spacing, heights or robot file first",
-    LENGTHS,
-)
-
-_DOUBTFUL_OUTLINE = Flag(
-    "outline-does-not-fit",
-    "neither the size of the outline nor the widths of its stripes are those of the body: another edge may be taken "
-    "for the body's, and no length is given: look at the annotated video, and draw a [region] around the robot",
-    LENGTHS,
-)
 
 
 def track_of(
@@ -167,9 +135,9 @@ def track_of(
     tail_size = _tail_size(known, sight.optics, roll[:, 0], tail[:, 0], np.isfinite(pose[:, 0]))
     scale, size_flags, roll_error = checked_scale(sight.scale, body, known.size, setup.markers.spacing, tail_size)
     if even.flags and any(flag.spoils for flag in size_flags):
-        roll_flags = (*roll_flags, _DOUBTFUL_STRIPES)
+        roll_flags = (*roll_flags, Flag.named("stripes-doubtful"))
     elif size_flags and any(flag.spoils for flag in even.flags):
-        roll_flags = (*roll_flags, _DOUBTFUL_OUTLINE if roll_error else _DOUBTFUL_SCALE)
+        roll_flags = (*roll_flags, Flag.named("outline-and-stripes-off" if roll_error else "scale-does-not-fit"))
     hand = known.wire.handedness()
     motion, pixel = RobotMotion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     seen_flags = (*seen_flags, *something_else_flag(other))
@@ -252,13 +220,7 @@ def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:
         return ()
     turned = float(np.ptp(body_angle[seen])) if (seen := np.isfinite(body_angle)).any() else 0.0
     enough = turned > STRIPES.turned_under_glare * 2.0 * np.pi / len(known.stripes.stripes)
-    then = (
-        "the interval of the body's rate is wider"
-        if enough
-        else f"the body seems to have turned by {math.degrees(turned):.0f} deg only, and its rate is not given"
-    )
-    sentence = f"a reflection hides much of the stripes: {then}; move the lamp, soften its light or turn a polariser"
-    return (Flag("stripes-under-glare", sentence, () if enough else ("body_rotation_rate",)),)
+    return (Flag.named("stripes-under-glare" if enough else "turns-under-glare", turned=math.degrees(turned)),)
 
 
 def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, placed_on: np.ndarray) -> float:

@@ -19,10 +19,8 @@ from spirillum.arrays import Samples
 from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import STANDING
-from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.track.steadiness import PictureSteps
 from spirillum.vision.track.track import RobotMotion
-from spirillum.vision.track.visibility import EVERYTHING
 
 
 @dataclass(frozen=True)
@@ -56,12 +54,7 @@ def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
     usual = _usual(motion.time)
     for one, other in pairwise(sorted(jumps)):
         if other.moment - one.moment < CUTS.gap * usual and _in_the_picture(one, motion.time, picture):
-            sentence = (
-                f"robot, body and tail jump at {one.moment:.2f} s, and so does the picture, while the times of the "
-                "frames go on evenly: a piece of the video is missing there; nothing is given (start and end of the "
-                "setup choose a part of the video)"
-            )
-            return (Flag("video-is-cut", sentence, EVERYTHING),)
+            return (Flag.named("video-is-cut", moment=one.moment),)
     return ()
 
 
@@ -89,17 +82,11 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
     if first is None:
         return Hops(0.0, 0.0, 0.0, ())
     names = [name for name, hop in zip(("place", "body angle", "tail phase"), hops, strict=True) if hop is not None]
-    what = " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+    what = f"{', '.join(names[:-1])} and {names[-1]} jump" if names[1:] else f"{names[0]} jumps"
     frame = int(np.searchsorted(motion.time, first.moment))
     miscounted = (tail := hops[2]) is not None and abs(tail.size) > CUTS.misread
-    sentence = (
-        f"the robot's {what} {'jump' if names[1:] else 'jumps'} at {first.moment:.2f} s (frame {frame}), where the "
-        "picture goes on evenly: the outline hops from one edge to another; "
-        + ("the tail's rotation is not given, and " if miscounted else "")
-        + "the intervals are wider for it: look at that frame of the annotated video, and choose a part of the video "
-        "without it (start and end of the setup)"
-    )
-    flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else (), frame)
+    name = "outline-hops-and-tail" if miscounted else "outline-hops"
+    flag = Flag.named(name, frame, what=what, moment=first.moment)
     place, body, phase = (abs(hop.size) if hop else 0.0 for hop in hops)
     return Hops(place, body, phase, (flag,))
 
@@ -135,17 +122,9 @@ def clock_of(motion: RobotMotion, length_per_pixel: float, period: float, stated
         return none
     start, span = float(time[gap]), float(steps[gap])
     if math.hypot(*passed) > 1.0:
-        sentence = (
-            f"the times of the frames jump by {span:.2f} s at {start:.2f} s, but body and tail go on as if no time had "
-            "passed: the time stamps are wrong; nothing is given (camera.frames_per_second would replace them)"
-        )
-        return Clock(0.0, (Flag("times-do-not-fit", sentence, EVERYTHING),))
-    sentence = (
-        f"no frame was taken for {span:.3g} s at {start:.2f} s, and the robot moves so little meanwhile that its "
-        "motion does not tell whether that time has passed or the clock of the camera jumped: the intervals hold both "
-        f"(measure with --end {start:.2f}s or --start {start + span:.2f}s)"
-    )
-    return Clock(0.5 * (span - usual) / float(closed[-1] - closed[0]), (Flag("clock-in-doubt", sentence),))
+        return Clock(0.0, (Flag.named("times-do-not-fit", span=span, start=start),))
+    flag = Flag.named("clock-in-doubt", span=span, start=start, stop=start + span)
+    return Clock(0.5 * (span - usual) / float(closed[-1] - closed[0]), (flag,))
 
 
 def one_picture(motion: RobotMotion) -> tuple[Flag, ...]:
@@ -155,11 +134,7 @@ def one_picture(motion: RobotMotion) -> tuple[Flag, ...]:
     frames = seen[0].size
     if frames < CUTS.long_window or any(values.size and np.ptp(values) > 0.0 for values in seen):
         return ()
-    sentence = (
-        f"{frames} frames show the robot at the same place and angles to the last digit, without the noise of any "
-        "camera: they are one picture; nothing is given"
-    )
-    return (Flag("one-picture", sentence, EVERYTHING),)
+    return (Flag.named("one-picture", frames=frames),)
 
 
 def standstill_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
@@ -176,12 +151,7 @@ def standstill_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag,
     if abs(line.slope) * float(np.ptp(time[known])) > CUTS.advance * length_per_pixel:
         return ()
     part = f"its tail turns {turns:.1f} times" if turns >= CUTS.tail_turns else "it turns"
-    sentence = (
-        f"{part}, but the robot does not advance by {CUTS.advance:g} pixels: it is stuck, or strong compression of the "
-        "video leaves out slow motion, or something that stands still, such as a cable, is taken for an edge of the "
-        "body; neither speed nor the tail's rotation is given: look at the annotated film"
-    )
-    return (Flag("does-not-advance", sentence, (*LENGTHS, "tail_rotation_rate")),)
+    return (Flag.named("does-not-advance", part=part, least=CUTS.advance),)
 
 
 def _turned(angle: Samples) -> float:
@@ -298,12 +268,8 @@ def no_motion_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, 
     read = [(values[known], limit) for values, limit in limits if (known := np.isfinite(values)).any()]
     if len(read) < 2 or not np.isfinite(x).any() or any(_total_change(values) > limit for values, limit in read):
         return ()
-    sentence = (
-        f"the robot is in view and stands still: in {np.ptp(time):.3g} s it advances by less than {STANDING.moved:g} "
-        f"pixels and turns by less than {np.degrees(STANDING.turned):.0f} degree; if it should move, check its motor, "
-        "or film for longer"
-    )
-    return (Flag("robot-stands-still", sentence),)
+    turned = np.degrees(STANDING.turned)
+    return (Flag.named("robot-stands-still", span=np.ptp(time), moved=STANDING.moved, turned=turned),)
 
 
 def _total_change(values: Samples) -> float:

@@ -17,7 +17,6 @@ from spirillum.arrays import Samples
 from spirillum.robust import mad_scale, repeated_median_line, stretches_of
 from spirillum.units import show
 from spirillum.vision.flag import Flag
-from spirillum.vision.track.size import LENGTHS
 
 
 @dataclass(frozen=True)
@@ -77,14 +76,9 @@ def something_else(
 
 def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
     """Note on such frames."""
-    count = int(found.sum())
-    if not count:
+    if not found.any():
         return ()
-    sentence = (
-        f"on {count} frames ({100.0 * count / found.size:.3g} %) the outline shows no stripes and no tail, and lies "
-        "beside the robot's path: they are left out; a [region] around the path avoids it"
-    )
-    return (Flag("something-else-followed", sentence),)
+    return (Flag.named("something-else-followed", count=found.sum(), share=100.0 * found.mean()),)
 
 
 def far_apart(time: Samples, x: Samples, length: float) -> tuple[Flag, ...]:
@@ -111,9 +105,4 @@ def far_apart(time: Samples, x: Samples, length: float) -> tuple[Flag, ...]:
         return ()
     around = np.abs(np.diff(beside[largest : largest + 2 * few]))
     frame = int(known[largest + 1 + np.argmax(around)])
-    sentence = (
-        f"the robot is at two places {show(float(steps[largest]), 'mm')} apart before and after {time[frame]:.2f} s "
-        f"(frame {frame}): a piece of the video is missing, or something else was followed; no speed is given: choose "
-        "one of both parts (start and end of the setup)"
-    )
-    return (Flag("something-else-followed", sentence, LENGTHS, frame),)
+    return (Flag.named("two-places", frame, apart=show(float(steps[largest]), "mm"), time=time[frame]),)

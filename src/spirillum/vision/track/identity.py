@@ -19,10 +19,9 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import DETECTION, IDENTITY, SIZE, STANDING
 from spirillum.vision.track.initial_detection import Start, detect_robot
 from spirillum.vision.track.search import close_places
-from spirillum.vision.track.size import LENGTHS, best_other_size, resized
+from spirillum.vision.track.size import best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
-from spirillum.vision.track.visibility import EVERYTHING, nose_on_the_other_side
 from spirillum.vision.video.frames import Frame
 
 _SIZES = (1.0, 0.3, 3.3)
@@ -56,25 +55,12 @@ class Identified(NamedTuple):
         """Warnings on another object, or on a second robot."""
         flags = []
         if self.stands:
-            sentence = (
-                "the robot's stripes are in view and stand still, but its tail is not found behind them, so that "
-                "nothing is given: film it while it moves; if it should move, check its motor"
-            )
-            flags.append(Flag("robot-stands-still", sentence, (*EVERYTHING, *LENGTHS[1:])))
+            flags.append(Flag.named("stripes-stand-still"))
         elif not self.robot:
-            sentence = (
-                "stripes and tail do not look like the robot's, and nothing is given: look at the annotated film; "
-                "where the outline is not on the robot, draw a [region] around it; where it is, glare or poor light "
-                "hide them, or the robot file, robot.direction, the ruler's spacing or the heights are wrong"
-            )
-            flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
+            flags.append(Flag.named("not-the-robot"))
         rivals = self.start.rivals
         if rivals and np.mean([self._matches(image, pose) for image, pose in rivals]) > IDENTITY.least_share:
-            sentence = (
-                f"more than one robot is in view (on {len(rivals)} of the frames looked at): it is not known which is "
-                "meant, so that nothing is given; a [region] around one of them in the setup would say"
-            )
-            flags.append(Flag("two-robots", sentence, EVERYTHING))
+            flags.append(Flag.named("two-robots", count=len(rivals)))
         return tuple(flags)
 
     @property
@@ -215,8 +201,9 @@ def _with_nose(
     """A robot that was found by its seal, with a flag where its whole tail is at the other end."""
     if found.wire.readable > IDENTITY.sure_share or not _turned_round(name, setup, stated, frames, still):
         return found
-    flags = (nose_on_the_other_side(stated.optics.direction),)
-    return found._replace(start=replace(found.start, flags=flags))
+    why = "turned round, it has the robot's tail"
+    flag = Flag.named("nose-on-the-other-side", side=stated.optics.direction, why=why)
+    return found._replace(start=replace(found.start, flags=(flag,)))
 
 
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:

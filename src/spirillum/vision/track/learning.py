@@ -85,11 +85,7 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
     rows, columns = np.nonzero(spots)
     u, v = low[0] + 0.5 * (columns.min() + columns.max()), low[1] + 0.5 * (rows.min() + rows.max())
     size = f"{np.ptp(columns) + 1} by {np.ptp(rows) + 1} pixels"
-    sentence = (
-        f"glare stands still at column {u:.0f}, row {v:.0f} ({size}): it shifts edges of the body, and the interval "
-        "of the speed is wider; move or soften the lamp"
-    )
-    return Glare(GLARE.drift, (Flag("standing-glare", sentence),))
+    return Glare(GLARE.drift, (Flag.named("standing-glare", u=u, v=v, size=size),))
 
 
 def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare | None:
@@ -114,11 +110,7 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
         return None
     there, beside = float(along[place]), float(sides[0].mean())
     u, v = project(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
-    sentence = (
-        f"a reflection ({size:.0f} of 255 brighter) stands still at column {u:.0f}, row {v:.0f}: it hides edges, and "
-        "the interval of the speed is wider; move or soften the lamp"
-    )
-    return Glare(GLARE.veil_drift, (Flag("standing-glare", sentence),))
+    return Glare(GLARE.veil_drift, (Flag.named("standing-reflection", step=size, u=u, v=v),))
 
 
 def _brightness(

@@ -22,7 +22,6 @@ from spirillum.vision.camera.optics import BodyPose, Optics, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import GROUPS
-from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.video.frames import Frame
 
 
@@ -162,17 +161,11 @@ def check_outline(
     known = [shares for shares in stays if np.count_nonzero(np.isfinite(shares)) >= LONE_OUTLINE.fewest]
     worst = max(known, key=lambda shares: float(np.nanmedian(shares)), default=np.zeros(len(frames)))
     odd = frames[int(np.nanargmax(worst))]
-    seen = f"no coloured seal of the stated size is found, and the outline may follow {suspect}"
-    look = f"look at frame {odd.index} ({odd.time:.2f} s) of the annotated video"
     if grid and (not known or float(np.nanmedian(worst)) > LONE_OUTLINE.stands):
         why = "what it follows stands still" if known else "it hardly moves"
-        words = (
-            f"{seen}, as {why}: speed and rates are not given; {look}, and check the heights, the ruler's spacing and "
-            "the robot file"
-        )
-        flag = Flag("outline-alone", words, (*LENGTHS, "body_rotation_rate", "tail_rotation_rate"), odd.index)
+        flag = Flag.named("outline-alone-stands", odd.index, suspect=suspect, time=odd.time, why=why)
         return OutlineCheck(0.0, (flag,), suspect)
-    flag = Flag("outline-alone", f"{seen}: speed and tail rate are less sure; {look}", (), odd.index)
+    flag = Flag.named("outline-alone", odd.index, suspect=suspect, time=odd.time)
     return OutlineCheck(LONE_OUTLINE.drift * factor, (flag,), suspect)
 
 

@@ -23,7 +23,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
 from spirillum.vision.track.multiples import Multiples, all_alike, multiples_of, near_their_mean
 from spirillum.vision.track.steadiness import PictureSteps
-from spirillum.vision.track.visibility import EVERYTHING
 
 
 class FrameSeries(NamedTuple):
@@ -40,14 +39,6 @@ class Restored(NamedTuple):
     time: Samples  #: Corrected time of each frame, s, (n,); the given times where nothing was corrected.
     relative_error: float  #: Relative standard uncertainty that doubtful steps leave in the length of the video.
     flags: tuple[Flag, ...]  #: What was corrected, or why nothing is given.
-
-
-class _Change(NamedTuple):
-    """A motion that is not in one direction throughout."""
-
-    name: str  # name of its flag
-    sentence: str
-    advice: str
 
 
 class _Jumps(NamedTuple):
@@ -95,14 +86,9 @@ def restored_times(time: Samples, readings: tuple[FrameSeries, ...], picture: Pi
     if many is not None and max(many.lost, many.repeated) > MULTIPLES.largest_share * many.steps:
         return none._replace(flags=(_no_usual_step(many),))
     repeats = 0 if uneven else _repeated(found.time, readings, frame, picture)
-    change = _change_of_motion(time, readings)
-    if change and (uneven or repeats):
-        return none._replace(
-            flags=(Flag(change.name, f"{change.sentence}; nothing is given: {change.advice}", EVERYTHING),)
-        )
+    change = _change_of_motion(time, readings, unclear=bool(uneven or repeats))
     if change:
-        means = Flag(change.name, f"{change.sentence}; rates are means from end to end: {change.advice}")
-        return found._replace(flags=(*found.flags, means))
+        return none._replace(flags=(change,)) if change.spoils else found._replace(flags=(*found.flags, change))
     if not repeats:
         return found
     doubt = LOST_FRAMES.repeats_error * repeats * frame / float(found.time[-1] - found.time[0])
@@ -130,7 +116,8 @@ def _restored_times(
         or stray > max(2.0, LOST_FRAMES.odd_share * lost.sum())
         or not all(_agrees(one, lost) for one in after)
     ):
-        flag = _uneven(int(np.count_nonzero(lost)) + stray, single=int(lost.sum()) + stray == 1)
+        single = int(lost.sum()) + stray == 1  # it changes no rate by more than its share of the video
+        flag = Flag.named("one-uneven-step" if single else "uneven-steps", count=int(np.count_nonzero(lost)) + stray)
         return Restored(time, 0.0 if flag.spoils else frame / float(time[-1] - time[0]), (flag,))
     corrected = _later(time, lost, frame)
     # A loss that one series alone shows counts half.
@@ -160,8 +147,8 @@ def _power(series: list[_Jumps]) -> float:
     return sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in series)
 
 
-def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...]) -> _Change | None:
-    """What changes in a video in which nothing moves for a while, or everything reversed; None of any other."""
+def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...], *, unclear: bool) -> Flag | None:
+    """Flag a video in which nothing moves for a while, or everything reverses; nothing is given if it is `unclear`."""
     few = LOST_FRAMES.standing // 3
     means = []
     for reading in readings:
@@ -181,9 +168,14 @@ def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...]) -> _Chan
     rests = stretches_of(np.abs(over).max(axis=(0, 2)) < LOST_FRAMES.still)
     if rests:
         longest = max(rests, key=len)
-        return _stands(float(time[longest[0]]), float(time[longest[-1] + LOST_FRAMES.standing - 1]), time)
+        first, last = float(time[longest[0]]), float(time[longest[-1] + LOST_FRAMES.standing - 1])
+        parts = [] if first <= time[1] else [f"--end {first:.2f}s"]
+        parts += [] if last >= time[-1] - (time[1] - time[0]) else [f"--start {last:.2f}s"]
+        name = "stands-and-uneven" if unclear else "stands-for-a-while"
+        return Flag.named(name, first=first, last=last, parts=" or ".join(parts))
     back = np.flatnonzero(over.max(axis=(0, 2)) < -LOST_FRAMES.still)
-    return _reverses(float(time[back[0]])) if back.size else None
+    name = "reverses-and-uneven" if unclear else "reverses"
+    return Flag.named(name, moment=time[back[0]]) if back.size else None
 
 
 def _later(time: Samples, lost: np.ndarray, frame: float) -> Samples:
@@ -311,24 +303,13 @@ def _corrected(lost: np.ndarray, *, doubtful: bool) -> Flag:
     count, places = int(lost.sum()), int(np.count_nonzero(lost))
     frames = "1 frame is" if count == 1 else f"{count} frames are"
     where = "at 1 place" if places == 1 else f"at {places} places"
-    words = (
-        f"{frames} missing {where} although the times of the frames go on evenly: the motion goes on by whole steps "
-        "there, and the times were corrected by it"
-    )
-    if doubtful:
-        words += "; not all of the series show it, so that all intervals are wider"
-    return Flag("lost-frames", words + " (record with the camera's own time stamps)")
+    doubt = "; not all of the series show it, so that all intervals are wider" if doubtful else ""
+    return Flag.named("lost-frames", frames=frames, where=where, doubt=doubt)
 
 
 def _repeats(count: int, steps: int) -> Flag:
-    frames = "1 frame repeats the one before" if count == 1 else f"{count} frames repeat the one before"
-    low = 100.0 * count / (steps - count)
-    sentence = (
-        f"{frames}: nothing moves there, and the next step is a usual one; if the recorder stored pictures twice, all "
-        f"rates are {low:.2g} % too low, if the film was converted from a lower frame rate, they are right: the "
-        "intervals hold both (record with the camera's own time stamps, at its own frame rate)"
-    )
-    return Flag("repeated-frames", sentence)
+    frames = "1 frame repeats" if count == 1 else f"{count} frames repeat"
+    return Flag.named("repeated-frames", frames=frames, low=100.0 * count / (steps - count))
 
 
 def _no_usual_step(many: Multiples) -> Flag:
@@ -337,40 +318,4 @@ def _no_usual_step(many: Multiples) -> Flag:
         what, wrong = f"some {many.lost} frames were lost between {many.steps} steps", "high"
     else:
         what, wrong = f"{many.repeated} of {many.steps} frames repeat the one before", "low"
-    sentence = (
-        f"{what}, although the times of the frames go on evenly: the motion goes on by whole multiples of one step, "
-        f"and the rates may be several times too {wrong}; nothing is given: record with the camera's own time stamps, "
-        "at its own frame rate"
-    )
-    return Flag("uneven-steps", sentence, EVERYTHING)
-
-
-def _stands(first: float, last: float, time: Samples) -> _Change:
-    near = float(time[1] - time[0])
-    before = "" if first <= float(time[0]) + near else f"--end {first:.2f}s"
-    behind = "" if last >= float(time[-1]) - near else f"--start {last:.2f}s"
-    return _Change(
-        "stands-for-a-while",
-        f"the robot stands from {first:.2f} s to {last:.2f} s, its tail too, and moves at other times",
-        f"measure with {' or '.join(part for part in (before, behind) if part)} (start and end of the setup)",
-    )
-
-
-def _reverses(moment: float) -> _Change:
-    return _Change(
-        "reverses",
-        f"the robot reverses at about {moment:.2f} s, its tail too",
-        f"measure with --end {moment:.2f}s or --start {moment:.2f}s (start and end of the setup)",
-    )
-
-
-def _uneven(count: int, *, single: bool) -> Flag:
-    """Flag steps that are no whole frames; a `single` frame changes no rate by more than its share of the video."""
-    frames = "1 frame" if count == 1 else f"{count} frames"
-    then = "all intervals are wider for it" if single else "nothing is given"
-    sentence = (
-        f"on {frames} the motion goes on by more than a step while the times go on evenly, but not clearly by "
-        "whole frames: frames were lost, strong compression of the video holds motion back, or the motor stutters; "
-        f"{then}: record with the camera's own time stamps, and compress less"
-    )
-    return Flag("uneven-steps", sentence, () if single else EVERYTHING)
+    return Flag.named("no-usual-step", what=what, wrong=wrong)

@@ -36,9 +36,6 @@ _SPANS = (0.08, 3.0, 3.0, 0.05), (0.01, 0.5, 0.5, 0.01), (0.002, 0.1, 0.1, 0.002
 """Half ranges of size, position (pixels) and heading (rad) in each round of the grid search."""
 _COUNTS = 13, 9, 5  # grid points of each parameter in each round
 
-LENGTHS = ("forward_velocity", "lateral_position", "lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
-"""Quantities that are proportional to the scale."""
-
 
 def clearness(found: Sequence[Sequence[PoseCandidate]]) -> float:
     """Clearness of a detection: median score of the best candidate over that of the third best, which is clutter."""
@@ -171,15 +168,9 @@ def _doubtful_ruler(scale: Scale, size: float, off: float, spacing: float | None
         if spacing is None
         else f" (about markers.spacing = {1e3 * spacing / size:.3g} mm in place of {1e3 * spacing:.3g} mm would fit)"
     )
-    sentence = (
-        f"body and tail both look {_describe_ratio(size)} at this scale: spacing, heights or index of the setup, or "
-        f"the size of the robot, are wrong{would}: measure them again; "
-    )
-    if off > SIZE.largest_difference:
-        flag = Flag("size-does-not-fit", sentence + "no length and no speed is given", LENGTHS)
-        return CheckedScale(scale, (flag,), 0.0)
-    flag = Flag("size-does-not-fit", sentence + "the intervals of lengths and speeds are wider for it")
-    return CheckedScale(with_source(scale, "size of the body", off), (flag,), 0.0)
+    far = off > SIZE.largest_difference
+    flag = Flag.named("size-far-off" if far else "size-does-not-fit", ratio=_describe_ratio(size), would=would)
+    return CheckedScale(scale if far else with_source(scale, "size of the body", off), (flag,), 0.0)
 
 
 def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, ruler: bool) -> CheckedScale:
@@ -190,16 +181,10 @@ def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, rul
     else:
         why = "the tail says nothing of it" if np.isnan(tail) else "the tail agrees with neither"
         remedy = "where it lies on the body, measure spacing, heights and body again"
-    sentence = (
-        f"the outline looks {_describe_ratio(size)}, and {why}: it may follow the rim or the contents of a glass "
-        f"cover, or a grid behind it: look at the annotated video, and {remedy}; "
-    )
     wider = scale if ruler else with_source(scale, "size of the body", off)
-    if off > (SIZE.largest_difference if ruler else SIZE.unconfirmed):
-        given = "no length, no speed and no rate of the body is given"
-        flag = Flag("outline-does-not-fit", sentence + given, (*LENGTHS, "body_rotation_rate"))
-    else:
-        flag = Flag("outline-does-not-fit", sentence + "the interval of the body's rate is wider for it")
+    far = off > (SIZE.largest_difference if ruler else SIZE.unconfirmed)
+    name = "outline-far-off" if far else "outline-does-not-fit"
+    flag = Flag.named(name, ratio=_describe_ratio(size), why=why, remedy=remedy)
     return CheckedScale(wider, (flag,), SIZE.roll_error * off)
 
 
@@ -248,8 +233,5 @@ def align_with_path(time: Samples, position: Samples, heading: Samples) -> Align
     if abs(roll) < DIRECTION.least:
         return AlignedTrack(position, heading, ())
     c, s = np.cos(roll), np.sin(roll)
-    sentence = (
-        f"the robot {'moves' if moves else 'lies'} at {np.degrees(roll):.1f} deg to the rows of the picture: lengths "
-        "are measured along its way, so the camera is taken to be rolled; put a ruler beside the channel to be sure"
-    )
-    return AlignedTrack(position @ np.array([[c, -s], [s, c]]), heading - roll, (Flag("camera-rolled", sentence),))
+    flag = Flag.named("camera-rolled", how="moves" if moves else "lies", angle=np.degrees(roll))
+    return AlignedTrack(position @ np.array([[c, -s], [s, c]]), heading - roll, (flag,))

@@ -101,12 +101,7 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
         return ()
     step = int(np.argmax([abs(b - a) for a, b in pairwise(shifts)]))
     before, after = (float(np.median([frames[k].time for k in parts[step + more]])) for more in (0, 1))
-    shift = factor * np.ptp(shifts)
-    sentence = (
-        f"the camera or the ruler was moved: the picture shifts by {shift:.1f} pixels along the channel, most between "
-        f"{before:.1f} s and {after:.1f} s; nothing is given (start and end of the setup choose a part of the video)"
-    )
-    return (Flag("camera-moved", sentence, ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")),)
+    return (Flag.named("camera-moved", shift=factor * np.ptp(shifts), before=before, after=after),)
 
 
 def _rows_of(start: Start, factor: int) -> tuple[int, int]:

@@ -92,13 +92,12 @@ class Stripes:
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Learn colours, shading and blur of the stripes from some frames of the video."""
         if len(self.names) < 2 or self.robot.seal is None:
-            sentence = "the robot has no stripes, so that its body's rotation cannot be seen; it is not given"
-            self.flags = (Flag("no-stripes", sentence, ("body_rotation_rate",)),)
+            self.flags = (Flag.named("no-stripes"),)
             return
         found = [self._profile(image, pose) for image, pose in samples]
         found = [(profile, scale) for profile, scale in found if np.isfinite(profile).all(axis=1).mean() > 0.5]
         if len(found) < 1:
-            self.flags = (self._unreadable(),)
+            self.flags = (Flag.named("stripes-unreadable"),)
             return
         profiles = np.array([profile for profile, _ in found])
         scales = np.array([scale for _, scale in found])
@@ -120,11 +119,7 @@ class Stripes:
             loss = self._typical_loss(self._fits(profiles, scales, other))
             self.appearance, least = (other, loss) if loss < least else (self.appearance, least)
         if not are_distinguishable(facing, palettes):
-            sentence = (
-                f"the seal does not show the colours {', '.join(self.names)}: what was learnt for them hardly differs; "
-                "the body's rotation is not given: check robot.stripes, or paint the stripes"
-            )
-            self.flags = (Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",)),)
+            self.flags = (Flag.named("stripes-of-other-colours", names=", ".join(self.names)),)
             return
         rightly = named_rightly(self.appearance.palette, start)
         counted = self._as_wide(seen_steep, (palette, *palettes[1:]))
@@ -133,17 +128,10 @@ class Stripes:
             return  # the stated order fits, with colours that match the names
         if verdict in ("reversed", "other"):
             how = "in the reversed order" if verdict == "reversed" else "in another order"
-            sentence = (
-                f"the stripes are seen {how} than {', '.join(self.stripes)}; the body's rotation is not given: "
-                "check robot.stripes"
-            )
-            self.flags = (Flag("stripe-order", sentence, ("body_rotation_rate",)),)
+            self.flags = (Flag.named("stripe-order", how=how, stripes=", ".join(self.stripes)),)
         elif least >= STRIPES.fits or not counted:
-            sentence = (
-                f"what is seen on the seal does not look like {len(self.stripes)} stripes, {', '.join(self.stripes)}; "
-                "the body's rotation is not given: check robot.stripes"
-            )
-            self.flags = (Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",)),)
+            stripes = ", ".join(self.stripes)
+            self.flags = (Flag.named("stripes-do-not-fit", count=len(self.stripes), stripes=stripes),)
         else:
             self.fits = True
 
@@ -151,21 +139,16 @@ class Stripes:
         """Learn the appearance of a single line: from what moves, for a highlight stays where it is."""
         line = initial_line_colours(profiles, facing, self.order)
         if line is None:
-            self.flags = (_line_flag("stripes-do-not-pass", "no painted line is seen to move over the seal"),)
+            self.flags = (Flag.named("no-line-moves"),)
             return
         self.appearance = self._refined(profiles, profiles, scales, line.palette, line.sheen)
         fits = self._fits(profiles, scales, self.appearance)
         count = np.count_nonzero(self._determined_frames(fits))
         contrast, first = (float(np.linalg.norm(np.diff(p, axis=0))) for p in (self.appearance.palette, line.palette))
         if count < SINGLE_LINE.frames:
-            few = f"the painted line can be read on {count} of the {len(fits)} frames looked at"
-            self.flags = (_line_flag("stripes-unreadable", few),)
+            self.flags = (Flag.named("line-unreadable", count=count, frames=len(fits)),)
         elif self._typical_loss(fits) >= STRIPES.fits or contrast < SINGLE_LINE.kept * first:
-            sentence = (
-                f"what moves over the seal does not look like a {self._line_words()}; the body's rotation is not "
-                "given: check robot.stripes"
-            )
-            self.flags = (Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",)),)
+            self.flags = (Flag.named("line-does-not-fit", line=self._line_words()),)
         else:
             self.fits = True
 
@@ -228,13 +211,6 @@ class Stripes:
         """Whether glare hides much of the stripes on half of the frames that were read so far."""
         known = [share for share in self._hidden if np.isfinite(share)]
         return bool(known) and float(np.median(known)) > STRIPES.hidden
-
-    def _unreadable(self) -> Flag:
-        sentence = (
-            "the stripes can be read on no frame, for glare hides them or the seal is out of view, so that the body's "
-            "rotation is not given: soften or move the lamp, and keep the seal in view"
-        )
-        return Flag("stripes-unreadable", sentence, ("body_rotation_rate",))
 
     def _profile(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
         """Colour profile along the angle, (n, 3), and pixels per radian, (n,); 0 where the surface faces away."""
@@ -335,15 +311,6 @@ class Stripes:
         usual = np.median(rough) + 1.0
         trust = 1.0 / (1.0 + STRIPES.doubt * (rough / usual) ** 2)
         return _Appearance(palette, light, appearance.blur, float(np.median(residuals)), trust / trust.max())
-
-
-def _line_flag(name: str, what: str) -> Flag:
-    """A flag on a single line of which too little is seen."""
-    sentence = (
-        f"{what}; the body's rotation is not given: film it for longer, while the line passes in front of the camera, "
-        "or paint more lines"
-    )
-    return Flag(name, sentence, ("body_rotation_rate",))
 
 
 def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) -> Samples:

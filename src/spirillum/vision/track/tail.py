@@ -17,7 +17,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import TAIL
 
-_TAIL = ("tail_rotation_rate",)
 _COARSE = 13  # stations along the tail at which the optics are evaluated
 _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
 """First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
@@ -25,6 +24,7 @@ _FACTORS = np.arange(0.60, 1.66, 0.03)  # candidate wavelengths, over that of th
 _NEAR = np.linspace(0.84, 1.16, 17)  # wavelengths over the robot file's among which the apparent one is interpolated
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 """Candidate amplitudes where the tail does not fit, over that of the robot file."""
+_UNSEEN = Flag.named("tail-unreadable")
 _PHASES = 2.0 * np.pi * np.arange(TAIL.phases) / TAIL.phases
 _TURNS = np.column_stack([np.cos(_PHASES), np.sin(_PHASES)])
 
@@ -42,15 +42,6 @@ class _SeenShape(NamedTuple):
 
     wavelength: float  # over that of the robot file
     amplitude: float  # over that of the robot file
-
-
-def _other_than_a_helix() -> Flag:
-    """Note that the phase of such a tail is not read."""
-    sentence = (
-        "the rotation of a tail other than one helix of one size is not read from pictures, and not given; "
-        "position and rotation of the body are"
-    )
-    return Flag("tail-unreadable", sentence, _TAIL)
 
 
 class TailWave:
@@ -106,7 +97,7 @@ class TailWave:
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Learn the contrast of the wire to its surroundings, and check its shape against the robot file."""
         if not self.robot.tail.form.is_plain:
-            self._flags = [_other_than_a_helix()]
+            self._flags = [Flag.named("tail-no-helix")]
             return
         strips = [(image, self._strip(pose)) for image, pose in samples]
         best, chosen = 0.0, None
@@ -120,7 +111,7 @@ class TailWave:
                 best, chosen = clear, contrast
         self.contrast = chosen
         if chosen is None:
-            self._flags = [self.unseen()]
+            self._flags = [_UNSEEN]
             return
         fits = np.array([answer for answer, _ in self.settled(strips)])
         readable = fits[:, 2] > TAIL.least_share
@@ -129,7 +120,7 @@ class TailWave:
         if self.readable > TAIL.seen_share and not self._flags:
             self.stretch = self._apparent_stretch([strips[k] for k in np.flatnonzero(readable)])
         if self.readable < 0.2 and not self._flags:
-            self._flags = [self.unseen()]
+            self._flags = [_UNSEEN]
 
     def _apparent_stretch(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> float:
         """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames."""
@@ -186,11 +177,7 @@ class TailWave:
         flags = list(self._flags)
         if self.handedness() == -1:
             hand = self.robot.tail.handedness
-            sentence = (
-                f"the tail looks {'left' if hand == 'right' else 'right'}-handed, by how perspective shows what is "
-                f"higher, but tail.handedness is '{hand}'; its sense of rotation, and so its rate, is not given"
-            )
-            flags.append(Flag("handedness", sentence, _TAIL))
+            flags.append(Flag.named("tail-of-other-hand", seen="left" if hand == "right" else "right", hand=hand))
         return tuple(flags)
 
     def flags_given_doubt(self, *, doubtful: bool) -> tuple[Flag, ...]:
@@ -198,7 +185,7 @@ class TailWave:
         if not doubtful:
             return self.flags
         other = [flag for flag in self.flags if flag.name != "tail-does-not-fit"]
-        return (*other, self.unseen()) if any(flag.spoils for flag in set(self.flags) - set(other)) else tuple(other)
+        return (*other, _UNSEEN) if any(flag.spoils for flag in set(self.flags) - set(other)) else tuple(other)
 
     def handedness(self) -> int:
         """Handedness by perspective: 1 as in the robot file, -1 the opposite one, 0 undecided."""
@@ -213,14 +200,6 @@ class TailWave:
         if abs(misfit + 1.0) < max(4.0 * error, 0.35):
             return 0
         return 1 if misfit > -1.0 else -1
-
-    def unseen(self) -> Flag:
-        """Note that the tail is not detected well enough."""
-        sentence = (
-            "the tail is not seen well enough, so that its rotation is not given: compress the film less, film the "
-            "tail larger, or before a floor and in a light from which its wire stands out"
-        )
-        return Flag("tail-unreadable", sentence, _TAIL)
 
     def _strip(self, pose: BodyPose) -> _Strip:
         pixels = project(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
@@ -329,26 +308,20 @@ class TailWave:
             return
         own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
         if abs(_FACTORS[best] - 1.0) > 0.07 and scores[best] > 1.15 * own:
-            spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
+            spoils = readable < 0.8 or own < 0.7 * scores[best]
             shape = self._apparent_shape(few)
             if shape is not None:
-                sentence = (
-                    f"the tail does not look as the robot file says{self._describe_difference(shape)}: check the file; "
-                    + ("the tail's rotation is not given" if spoils else "its rotation is read all the same")
-                )
-                self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
+                name = "tail-far-off" if spoils else "tail-does-not-fit"
+                self._flags.append(Flag.named(name, how=self._describe_difference(shape)))
             elif spoils:
-                self._flags.append(self.unseen())
+                self._flags.append(_UNSEEN)
             return
         tail = self.robot.tail
         if len(fits):
             share = float(fits[:, 7].sum() / max(fits[:, 8].sum(), 1e-300))
             if abs(share) > 0.2 and self._fits_better(ridges, 1.0 + share, own):
-                sentence = (
-                    f"the tail's amplitude looks like {(1.0 + share) * tail.amplitude * 1e3:.1f} mm or further from "
-                    f"that of the file, {tail.amplitude * 1e3:.3g} mm: check it; its rotation is read all the same"
-                )
-                self._flags.append(Flag("tail-does-not-fit", sentence))
+                given = tail.amplitude * 1e3
+                self._flags.append(Flag.named("tail-of-other-amplitude", seen=(1.0 + share) * given, given=given))
 
     def _fits_better(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float, own: float) -> bool:
         """Whether a wave of another amplitude over that of the file, at its wavelength, lies more on the wire."""

@@ -91,11 +91,8 @@ def agreement_of(time: Samples, shifts: Sequence[Samples], tail: Samples, pixel:
         return Agreement(cues, drift, ())
     odd = int(np.flatnonzero(known)[np.argmax(np.abs(apart - np.median(apart)))])
     why = f"the outline follows {suspect}" if suspect else "outline and seal of the body disagree"
-    sentence = (
-        f"{why}: frame {odd} ({time[odd]:.2f} s) of the annotated video; it moves by {abs(way) / pixel:.1f} pixels "
-        "against the seal, and the interval of the speed holds both"
-    )
-    return Agreement(cues, drift, (Flag("cues-disagree", sentence, (), odd),))
+    flag = Flag.named("cues-disagree", odd, why=why, time=time[odd], way=abs(way) / pixel)
+    return Agreement(cues, drift, (flag,))
 
 
 class RobotMotion(NamedTuple):

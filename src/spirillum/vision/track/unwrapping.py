@@ -20,7 +20,6 @@ from spirillum.vision.track.constants import UNWRAPPING
 from spirillum.vision.track.track import RobotMotion
 
 _Part = Literal["body", "tail"]
-_RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
 
 
 def unwrapped(
@@ -41,24 +40,19 @@ def unwrapped(
         flags.append(_unread(part, known.size, angle.size))
     least = UNWRAPPING.least_order
     if abs(rate) * dt > UNWRAPPING.largest_step * period:
-        flags.append(_too_fast(part, rate, dt, period))
+        step = abs(rate) * dt / period
+        flags.append(Flag.named("turns-too-fast", part=part, step=step, largest=UNWRAPPING.largest_step))
     elif (other := _better_alias(t, a, period, dt, rate)) is not None:
-        flags.append(_other_rate(part, rate, other))
+        flags.append(Flag.named("another-rate", part=part, rate=rate / (2 * np.pi), other=other / (2 * np.pi)))
     elif order < least and _local_order(t, a, period, dt) < least:  # at a start or stop, steps agree locally
-        flags.append(_jumps(part))
+        flags.append(Flag.named("angle-jumps", part=part))
     values, doubtful = _followed(t, a, error[known], period, dt)
     if doubtful:
-        flags.append(
-            Flag(
-                f"{part}-turns-lost",
-                f"between {doubtful[0]:.1f} s and {doubtful[1]:.1f} s the {part} was not seen for so long that whole "
-                "turns may be missing from its angle",
-            )
-        )
+        flags.append(Flag.named("turns-lost", part=part, start=doubtful[0], stop=doubtful[1]))
     if part == "body":
         values = _without_strays(t, values, dt)
         if (count := _leaps(t, values, dt)) >= UNWRAPPING.leaps:
-            flags.append(_wrong_stripes(count))
+            flags.append(Flag.named("stripes-leap", count=count, angle=np.degrees(UNWRAPPING.leap)))
     out[known] = values
     return out, tuple(flags)
 
@@ -174,53 +168,9 @@ def _leaps(t: Samples, values: Samples, dt: float) -> int:
     return int(np.sum((off > UNWRAPPING.leap) & (spans < 10.0 * dt)))
 
 
-def _wrong_stripes(count: int) -> Flag:
-    return Flag(
-        "stripes-do-not-fit",
-        f"the body's angle leaps {count} times by more than {np.degrees(UNWRAPPING.leap):.0f} degrees from frame to "
-        "frame: number or order of the stripes is wrong, or they are misread; the body's rotation is not given",
-        _RATES["body"],
-    )
-
-
 def _unread(part: _Part, seen: int, total: int) -> Flag:
-    name, what = ("stripes-unreadable", "stripes") if part == "body" else ("tail-unreadable", "tail")
-    if seen < max(4, UNWRAPPING.least_share * total):
-        return Flag(
-            name,
-            f"the {what} could be read on {seen} of {total} frames; the rotation is not given: sharper, larger "
-            "pictures, less compressed, show more",
-            _RATES[part],
-        )
-    return Flag(name, f"the {what} could be read on {seen} of {total} frames only: sharper, larger pictures show more")
-
-
-def _jumps(part: _Part) -> Flag:
-    return Flag(
-        f"aliased-{part}",
-        f"the {part}'s angle jumps from frame to frame without order: it turns too fast for this frame rate, or it is "
-        "misread; its rotation is not given",
-        _RATES[part],
-    )
-
-
-def _too_fast(part: _Part, rate: float, dt: float, period: float) -> Flag:
-    return Flag(
-        f"aliased-{part}",
-        f"the {part} turns by {abs(rate) * dt / period:.2f} of a period from frame to frame, so that its sense of "
-        f"rotation is doubtful; allowed: below {UNWRAPPING.largest_step:g}, with more frames a second; its "
-        "rotation is not given",
-        _RATES[part],
-    )
-
-
-def _other_rate(part: _Part, rate: float, other: float) -> Flag:
-    return Flag(
-        f"aliased-{part}",
-        f"by the uneven times of the frames the {part} turns at {other / (2 * np.pi):.3g} Hz rather than "
-        f"{rate / (2 * np.pi):.3g} Hz, too fast for this frame rate; its rotation is not given",
-        _RATES[part],
-    )
+    name = "unreadable" if seen < max(4, UNWRAPPING.least_share * total) else "partly-unreadable"
+    return Flag.named(name, part=part, what="stripes" if part == "body" else "tail", seen=seen, total=total)
 
 
 def _slope(time: Samples, value: Samples) -> tuple[float, float]:
@@ -241,11 +191,7 @@ def static_object_flag(motion: RobotMotion, robot: Robot) -> tuple[Flag, ...]:
     moved, turned = (abs(_slope(time, values)[1]) for values in (x, body_angle))
     if np.isfinite(tail_phase).any() or moved > UNWRAPPING.rest * robot.body.length or turned > UNWRAPPING.rest_angle:
         return ()
-    sentence = (
-        "what was followed neither moves nor turns, and its tail is not seen: a robot that stands still, or something "
-        "else in the picture; nothing is given: film it while it moves"
-    )
-    return (Flag("robot-stands-still", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
+    return (Flag.named("static-object"),)
 
 
 def no_stripe_passes(motion: RobotMotion, robot: Robot, *, readable: float = 1.0) -> tuple[Flag, ...]:
@@ -259,12 +205,7 @@ def no_stripe_passes(motion: RobotMotion, robot: Robot, *, readable: float = 1.0
     low, high = np.quantile(known, [0.02, 0.98])
     if high - low > UNWRAPPING.seen_to_pass:
         return ()
-    sentence = (
-        f"the body turns by less than {np.degrees(UNWRAPPING.seen_to_pass):.0f} degrees while its tail makes "
-        f"{turns:.1f} turns: no stripe was seen to pass, and shades of the lamp may be taken for stripes; the body's "
-        "rotation is not given: check that the seal has the stripes of the robot file, and that the body is not stuck"
-    )
-    return (Flag("stripes-do-not-pass", sentence, _RATES["body"]),)
+    return (Flag.named("stripes-do-not-pass", least=np.degrees(UNWRAPPING.seen_to_pass), turns=turns),)
 
 
 def contradictions(motion: RobotMotion, robot: Robot, hand_seen: int = 0) -> tuple[Flag, ...]:
@@ -279,26 +220,12 @@ def contradictions(motion: RobotMotion, robot: Robot, hand_seen: int = 0) -> tup
     _, moved = _slope(time, x)
     turns = abs(tail_turned) > UNWRAPPING.turning
     if turns and abs(body_turned) > UNWRAPPING.turning and body * tail > 0:
-        if hand_seen > 0:
-            sentence = (
-                "body and tail seem to turn the same way, as no free swimmer does, though the tail's hand is as given: "
-                "its rate is likely too fast for this frame rate, or the order of the stripes is wrong; none is given"
-            )
-            return (Flag("aliased-tail", sentence, (*_RATES["tail"], *_RATES["body"])),)
-        sentence = (
-            "body and tail seem to turn the same way, as no free swimmer does: tail.handedness or the order of the "
-            "stripes is wrong, or the tail is too fast for this frame rate; neither rotation is given"
-        )
-        return (Flag("handedness", sentence, (*_RATES["tail"], *_RATES["body"])),)
+        return (Flag.named("turns-with-body" if hand_seen > 0 else "handedness"),)
     far = abs(moved) > 0.05 * robot.body.length
     if far and np.isfinite(tail_phase).any() and (flags := _not_driven(moved, tail_turned, robot)):
         return flags
     if turns and abs(body) > 1.5 * abs(tail):
-        sentence = (
-            "the body seems to turn faster than its tail: the tail may be too fast for this frame rate "
-            f"({abs(tail) / (2 * np.pi):.3g} Hz is the least rate that fits)"
-        )
-        return (Flag("aliased-tail", sentence),)
+        return (Flag.named("body-outruns-tail", tail=abs(tail) / (2 * np.pi)),)
     return ()
 
 
@@ -315,8 +242,7 @@ def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, .
         )
     else:
         why = "moves while its tail seems to rest"
-    sentence = f"the robot {why}: {what}, or something else moves the robot; the tail's rotation is not given"
-    return (Flag("aliased-tail", sentence, _RATES["tail"]),)
+    return (Flag.named("not-driven", why=why, what=what),)
 
 
 def _largest_advance(robot: Robot) -> float:

@@ -17,7 +17,6 @@ from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places
 
 _THREADS = 2
-EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")  #: All rates of a track.
 
 
 def rivals_in(
@@ -56,16 +55,8 @@ def turned_flags(
         turned = _turned(body, seen, still)
     if turned <= VISIBILITY.turned:
         return ()
-    return (nose_on_the_other_side(body.optics.direction, f"turned round, it fits {turned:.2g} times better"),)
-
-
-def nose_on_the_other_side(side: str, why: str = "turned round, it has the robot's tail") -> Flag:
-    """Flag a robot whose nose is at the other end."""
-    sentence = (
-        f"the nose is on the other side than robot.direction = '{side}' says: {why}; all signs would be wrong, so that "
-        "nothing is given: give it the other way"
-    )
-    return Flag("nose-on-the-other-side", sentence, EVERYTHING)
+    why = f"turned round, it fits {turned:.2g} times better"
+    return (Flag.named("nose-on-the-other-side", side=body.optics.direction, why=why),)
 
 
 def _turned(body: Shape, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
@@ -95,18 +86,10 @@ def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
         turns = np.concatenate([np.zeros(1), np.cumsum(np.maximum(1.0, np.round(steps / usual)))])
         whole = turns if np.mean(np.abs(steps / usual - np.round(steps / usual)) < 0.2) > 0.95 else index - index[0]
     missing = int(whole[-1] - whole[0]) + 1 - time.size
-    flags: tuple[Flag, ...] = ()
-    if missing > 0:
-        share = 100.0 * missing / (missing + time.size)
-        longest = float(steps.max())
-        flags = (
-            Flag(
-                "dropped-frames",
-                f"{missing} frames ({share:.1f} %) are missing by the times of the film, which are used; the longest "
-                f"gap is {longest:.3g} s",
-            ),
-        )
-    return index[0] + whole, flags
+    if missing <= 0:
+        return index[0] + whole, ()
+    share = 100.0 * missing / (missing + time.size)
+    return index[0] + whole, (Flag.named("dropped-frames", missing=missing, share=share, longest=steps.max()),)
 
 
 def cut_off(found: Sequence[PoseFit]) -> np.ndarray:
@@ -125,57 +108,27 @@ def sight_flags(
     known = np.isfinite(pose[:, 0])
     count = known.size
     if not known.any():
-        return (Flag("robot-not-seen", "the robot was not seen well enough on any frame", EVERYTHING),)
+        return (Flag.named("robot-not-seen"),)
     first, last = np.flatnonzero(known)[[0, -1]]
     inside = np.array([one.inside for one in found])
     if count - 1 - last > max(3, VISIBILITY.lost * count):
-        flags.append(
-            Flag(
-                "robot-left-the-view",
-                f"the robot was last seen at {time[last]:.2f} s of {time[-1]:.2f} s: what was measured until then "
-                "is kept",
-            )
-        )
+        flags.append(Flag.named("robot-left-the-view", last=time[last], end=time[-1]))
     if first > max(3, VISIBILITY.lost * count):
-        sentence = f"the robot was first seen at {time[first]:.2f} s: the measurement begins there"
-        flags.append(Flag("robot-came-late", sentence))
+        flags.append(Flag.named("robot-came-late", first=time[first]))
     between = ~known[first : last + 1]
     if between.mean() > VISIBILITY.lost:
-        flags.append(
-            Flag(
-                "robot-lost",
-                f"the robot was not seen on {between.sum()} frames ({100 * between.mean():.1f} %) between: they are "
-                "left out",
-            )
-        )
+        flags.append(Flag.named("robot-lost", count=between.sum(), share=100 * between.mean()))
     part = known & (inside < VISIBILITY.full_view)
     if part.mean() > VISIBILITY.lost:
-        flags.append(
-            Flag(
-                "robot-partly-out-of-view",
-                f"the robot is partly out of view on {100 * part.mean():.0f} % of the frames: "
-                + ("they are left out" if cut_off(found).any() else "its place there is less sure"),
-            )
-        )
+        then = "they are left out" if cut_off(found).any() else "its place there is less sure"
+        flags.append(Flag.named("robot-partly-out-of-view", share=100 * part.mean(), then=then))
     share = np.array([one.share for one in found])
-    if known.sum() and float(np.median(share[known])) < VISIBILITY.hidden:
-        flags.append(
-            Flag(
-                "edges-hidden",
-                f"only {100 * float(np.median(share[known])):.0f} % of the body's edges look alike on most frames: "
-                "glare, a shadow, bubbles or a wrong robot file; the place rests on the others",
-            )
-        )
+    if (usual := float(np.median(share[known]))) < VISIBILITY.hidden:
+        flags.append(Flag.named("edges-hidden", share=100 * usual))
     if known.sum() > 10:
         t, x = time[known], pose[known, 0]
         line = least_squares_line(t, x)
         spread = float(np.std(x - line.at(t))) + float(np.nanmedian(errors[:, 0]))
         if line.slope * (t[-1] - t[0]) < -max(5.0 * spread, 2.0 * optics.length_per_pixel):
-            flags.append(
-                Flag(
-                    "moves-backwards",
-                    f"the robot moves away from its nose: is robot.direction = '{setup.robot.direction}' right? If "
-                    "it is, the forward velocity is negative",
-                )
-            )
+            flags.append(Flag.named("moves-backwards", side=setup.robot.direction))
     return tuple(flags)

@@ -105,13 +105,8 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     better[known] = np.where(weight.sum(axis=1) > 0, angle[known] + own, np.nan)
     surer[known] = np.hypot(error[known], WIDTHS.left * off)
     even = 2.0 * np.pi / count
-    sentence = (
-        f"the stripes are uneven: against those of even stripes, {np.degrees(even):.0f} deg each, their edges are "
-        f"shifted by amounts that differ by up to {np.degrees(off):.1f} deg; their places were learnt from the film "
-        "and used"
-    )
-    drift = 0.0 if seen.all() else WIDTHS.size * turned
-    return Evened(better, surer, (Flag("uneven-stripes", sentence),), drift)
+    flag = Flag.named("uneven-stripes", even=np.degrees(even), off=np.degrees(off))
+    return Evened(better, surer, (flag,), 0.0 if seen.all() else WIDTHS.size * turned)
 
 
 def _off_even(places: Samples) -> Samples:
@@ -132,13 +127,8 @@ def _not_of_paint(places: Samples) -> Flag | None:
     if np.abs(off).max() <= WIDTHS.widest and not to_one_side:
         return None
     most = off[np.argmax(np.abs(off))]
-    far = f"{100.0 * abs(most):.0f} % {'wider' if most > 0 else 'narrower'}"
-    sentence = (
-        f"the stripes look up to {far} than even ones, and not as paint is: their number or order, the body's "
-        "diameter, the scale, or pixels that are not square may be the reason; the body's rotation is not given: count "
-        "the stripes, and compare the ruler's spacing"
-    )
-    return Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",))
+    side = "wider" if most > 0 else "narrower"
+    return Flag.named("stripes-not-of-paint", far=100.0 * abs(most), side=side)
 
 
 def _another_size(places: Samples) -> tuple[float, Flag] | None:
@@ -161,12 +151,7 @@ def _another_size(places: Samples) -> tuple[float, Flag] | None:
     if misfit(WIDTHS.painted) < misfit(0.0):
         return None
     side = "wider" if off.mean() > 0 else "narrower"
-    sentence = (
-        f"all stripes in view look {100.0 * abs(off.mean()):.1f} % {side} than even ones: if the view makes them so, "
-        "they are even and taken as such; if paint does, the body's rate is off by as much, and its interval holds "
-        "both: compare the body's diameter, heights and spacing with the setup"
-    )
-    return float(off.mean()), Flag("stripes-of-another-size", sentence)
+    return float(off.mean()), Flag.named("stripes-of-another-size", far=100.0 * abs(off.mean()), side=side)
 
 
 def _places(shifts: Samples) -> tuple[Samples, float]:

@@ -26,11 +26,6 @@ class Display(NamedTuple):
     across: bool = False  #: Whether left and right are exchanged afterwards.
     down: bool = False  #: Whether top and bottom are exchanged afterwards.
 
-    @property
-    def is_turned(self) -> bool:
-        """Whether the orientation changes."""
-        return self[1:] != (False, False, False)
-
     def size(self, stored: tuple[int, int]) -> tuple[int, int]:
         """Width and height as shown of a picture by those that are stored, pixels."""
         width, height = max(1, round(stored[0] * self.aspect)), stored[1]
@@ -103,30 +98,15 @@ def display_flags(
     """Corrections of the pictures, and where each was stated."""
     flags, width = [], round(stored[0] * display.aspect)
     if given is not None and stated is not None and round(stored[0] * stated) != width:
-        sentence = (
-            f"camera.pixel_aspect_ratio = {given:.6g} replaces the {stated:.6g} that the file states: all lengths "
-            "along the picture's rows follow it"
-        )
-        flags.append(Flag("pixel-aspect-replaced", sentence))
+        flags.append(Flag.named("pixel-aspect-replaced", given=given, stated=stated))
     elif width != stored[0]:
         whose, wrong = ("the setup", "") if given else ("the file", "; if it is wrong, set camera.pixel_aspect_ratio")
-        sentence = (
-            f"{whose} states a pixel aspect ratio of {display.aspect:.6g}: pictures of {stored[0]} x {stored[1]} "
-            f"pixels are stretched to {width} x {stored[1]} square ones{wrong}"
-        )
-        flags.append(Flag("pixels-not-square", sentence))
-    if display.is_turned:
-        sentence = (
-            f"the file states that its pictures are shown {_turned(display)}, and so they are measured: pixels "
-            "of setup and tables are those of the shown picture"
-        )
-        flags.append(Flag("pictures-turned", sentence))
+        size = {"width": stored[0], "height": stored[1], "shown": width}
+        flags.append(Flag.named("pixels-not-square", whose=whose, aspect=display.aspect, wrong=wrong, **size))
+    if display[1:] != (False, False, False):
+        flags.append(Flag.named("pictures-turned", turned=_turned(display)))
     if math.tan(slant) > _SLANT:
-        sentence = (
-            f"the file states that its pictures are shown turned by {math.degrees(slant):.3g} deg off a quarter turn: "
-            "that part is left out, and the robot's path is measured along the ruler or its heading"
-        )
-        flags.append(Flag("slant-left-out", sentence))
+        flags.append(Flag.named("slant-left-out", slant=math.degrees(slant)))
     return flags
 
 

@@ -188,13 +188,13 @@ class Video:
         """An image, with a note where it could not be read."""
         if picture is None:
             assert self.images is not None  # noqa: S101
-            name = self.images.name(index)
-            self._note("unreadable-frames", f"{name} cannot be read: such images are left out")
+            self._note("image-unreadable", name=self.images.name(index))
         return picture
 
-    def _note(self, name: str, sentence: str) -> None:
-        if all(flag.name != name for flag in self.flags):
-            self.flags.append(Flag(name, sentence))
+    def _note(self, name: str, /, **values: Any) -> None:
+        flag = Flag.named(name, **values)
+        if all(other.name != flag.name for other in self.flags):
+            self.flags.append(flag)
 
     def _film(self) -> Iterator[tuple[int, float, Any]]:
         """Index, time and a function that gives the picture, of every frame that can be decoded."""
@@ -202,7 +202,7 @@ class Video:
         index = -1
         for index, (frame, stamp) in enumerate(self._decoded()):
             if self.display.size((frame.width, frame.height)) != self.size:
-                self._note("unreadable-frames", "the film changes its size on the way: frames of another are left out")
+                self._note("size-changes")
                 continue
             if self.given_rate or stamp is None:
                 time = index / (self.rate or 30.0)
@@ -210,7 +210,7 @@ class Video:
                 origin = stamp if origin is None else origin
                 time = float(stamp - origin)
             if last is not None and time <= last:
-                self._note("unordered-times", "time stamps that do not rise were found: such frames are left out")
+                self._note("unordered-times")
                 continue
             before, last = last, time
             yield index, time, partial(rgb, frame)
@@ -222,13 +222,9 @@ class Video:
         duration, stated, tolerance = self.stated
         missing = 0.0 if duration is None else duration - (last + step)
         if duration is not None and missing > max(tolerance, _MISSING * duration):
-            self._ends_early(f"it ends at {last:.2f} s, {missing:.1f} s are missing")
+            self._note("video-ends-early", reason=f"it ends at {last:.2f} s, {missing:.1f} s are missing")
         elif stated - frames > max(_FEW, _MISSING * stated):
-            sentence = (
-                f"the file states {stated} frames, {frames} can be read: the others are empty, hidden by its edit "
-                "list, or damaged"
-            )
-            self._note("unreadable-frames", sentence)
+            self._note("frames-hidden", stated=stated, frames=frames)
 
     def _decoded(self) -> Iterator[tuple[Any, float | None]]:
         """The video's frames, each with its time, until its end, or until it cannot be decoded any further."""
@@ -245,10 +241,7 @@ class Video:
                 reason = short_reason(error)
                 if not count:
                     raise InputError(f"{self.path} cannot be decoded ({reason}); allowed: {VIDEO}") from error
-                self._ends_early(f"after {count} frames: {reason}")
-
-    def _ends_early(self, reason: str) -> None:
-        self._note("video-ends-early", f"the video could not be read to its end ({reason}): what was read is kept")
+                self._note("video-ends-early", reason=f"after {count} frames: {reason}")
 
     def _film_samples(self, times: list[float]) -> list[Frame]:
         if self.given_rate or not self.duration:  # its own time stamps do not count
@@ -346,11 +339,7 @@ def _replaced(given: float | None, own: float) -> list[Flag]:
     """That a rate which the setup gives stands in place of another one, as of a camera for slow motion."""
     if given is None or own == 0.0 or abs(given / own - 1.0) < _SAME_RATE:
         return []
-    sentence = (
-        f"camera.frames_per_second = {given:g} stands in place of the {own:.4g} frames a second that the film states: "
-        "all speeds and rates follow it"
-    )
-    return [Flag("rate-replaced", sentence)]
+    return [Flag.named("rate-replaced", given=given, own=own)]
 
 
 def _images(path: Path, frames_per_second: float | None, aspect: float | None) -> Video:

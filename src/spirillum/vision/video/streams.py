@@ -74,11 +74,7 @@ def main_video_stream(container: Any) -> tuple[Any, list[Flag]]:
         return chosen, []
     known = [one for one in films if _area(one)]
     told = ", ".join(f"{one.index} ({one.width} x {one.height}, {lengths[one.index]:.3g} s)" for one in known)
-    sentence = (
-        f"the file holds {len(films)} films, in streams {told}: stream {chosen.index} is measured; to measure another, "
-        "write it to a file of its own"
-    )
-    return chosen, [Flag("several-films", sentence)]
+    return chosen, [Flag.named("several-films", count=len(films), streams=told, chosen=chosen.index)]
 
 
 def _area(stream: Any) -> int:
@@ -274,11 +270,7 @@ def _sequence(
     bits = max(map(bits_of, deep), default=8)
     flags = display_flags(display, header.size, stated, aspect)
     if deep:
-        sentence = (
-            f"16-bit images whose values fill {bits} bits (by {len(deep)} of them) are measured in 8 bits: "
-            f"{2**bits - 1} and more is white"
-        )
-        flags.append(Flag("sixteen-bit-images", sentence))
+        flags.append(Flag.named("sixteen-bit-images", bits=bits, count=len(deep), most=2**bits - 1))
     return ImageSequence(files, pages, numbers, display, header, bits, tuple(flags))
 
 
