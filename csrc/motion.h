@@ -17,7 +17,7 @@ typedef struct {
     double resistance, power, reach; /* c, N s/m; p; H, m */
 } Ring;
 
-/* A robot without a tube, opened from `packed` of two_links.py. */
+/* A robot without a tube, opened from `TwoLinks.data` of dynamics/free_robot.py. */
 typedef struct {
     const Links *links;
     const double *drag; /* A(0), (7, 7), SI */
@@ -47,7 +47,7 @@ typedef struct {
     bool has_slopes;
 } PlaceMemory;
 
-/* A robot in its tube, opened from `packed` of tube_motion.py. */
+/* A robot in its tube, opened from `TubeRobot.data` of dynamics/tube_robot.py. */
 typedef struct {
     const Links *links;
     const Tube *tube;

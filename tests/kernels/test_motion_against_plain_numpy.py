@@ -6,10 +6,11 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import spirillum as sp
+from spirillum.dynamics.free_robot import packed
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import core, tube_motion, two_links
+from spirillum.kernels import core
 from spirillum.kernels.core import resistance_at
 from spirillum.robot.batch import RobotBatch
 
@@ -100,7 +101,7 @@ def test_rates_without_a_tube(kind: float, fixed: float, gap: float) -> None:
     case, rough, load = Case(kind, fixed, gap), 1e-5, 0.01
     wall, ring = np.array([RADIUS, rough, 1e3, load]), np.array([[0.002, 0.009, 0.0, 0.3, 1.5, 5e-4]])
     none = np.zeros(0)
-    data = two_links.packed(case.drag, case.friction, case.weight, wall, ring, case.drive)
+    data = packed(case.friction, case.weight, case.drive, case.drag, wall, ring)
     dy, j, thinnest = np.empty(19), np.empty(6), np.empty(1)
     core.rates(dy, 0.7, case.state, data, none)
     core.gaps_of(case.state, data, none, thinnest)
@@ -152,7 +153,8 @@ def test_rates_in_a_tube(table: np.ndarray, kind: float, fixed: float, ends: flo
     tube = np.array([RADIUS, rough, 0.05, MU, SLOW, VISCOSITY, ends, 0.5, np.inf])
     sites = np.array([[0.0085, 0.0, 0.0, 0.009, 0.0], [-0.0175, 0.0085, 0.0, 0.0005, 1.0]])
     flow = np.array([[0.0, 0.0], [0.5, 1e-3], [1.0, 3e-3], [2.0, 0.0]])
-    data = tube_motion.packed(case.friction, case.weight, case.drive, tube, np.zeros(6), sites, np.zeros((0, 4)), flow)
+    counts, wire = np.array([len(sites), 0.0]), np.zeros(6)
+    data = packed(case.friction, case.weight, case.drive, tube, counts, wire, sites, flow)
     dy, gaps = np.empty(19), np.empty(3)
     core.rates(dy, 0.7, case.state, data, table)
     core.gaps_of(case.state, data, table, gaps)
@@ -193,7 +195,7 @@ def test_steps_are_those_of_another_method() -> None:
     case.weight *= 1e-3
     case.drive[core.DRIVE_FIELD_RATE] = 3.0
     case.drive[core.DRIVE_MOMENT : core.DRIVE_MOMENT + 3] *= 1e-3
-    data = two_links.packed(case.drag, case.friction, case.weight, np.full(4, np.inf), np.zeros((0, 6)), case.drive)
+    data = packed(case.friction, case.weight, case.drive, case.drag, np.full(4, np.inf))
     y, dy = case.state.copy(), np.empty(19)
     y[3:7] /= np.linalg.norm(y[3:7])
 

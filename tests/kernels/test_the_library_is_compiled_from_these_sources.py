@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spirillum.dynamics.free_robot import packed
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import core, native, two_links
+from spirillum.kernels import core, native
 from spirillum.kernels.core import contact_offset, film_coordinates, spline_weights
 
 CPU = Path("/proc/cpuinfo")
@@ -49,12 +50,12 @@ def test_optimised_sources_compile_without_a_warning(build: dict[str, Any], tmp_
 
 def test_every_build_finds_the_same_numbers(strict: Path, wide: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without fused products or sums in another order, so that a run is the same on every processor."""
-    packed = find_table(RobotGeometry.of(wide, 0), tube_radius(wide, 0)).packed
+    table = find_table(RobotGeometry.of(wide, 0), tube_radius(wide, 0)).packed
     rng = np.random.default_rng(1)
     poses = [(*rng.uniform([2e-3, -0.05, -0.03], [6e-3, 0.05, 0.03]), phase) for phase in range(10)]
     half, other = rng.normal(size=(7, 7)), rng.uniform(size=(7, 7))
     drive = np.append(np.zeros(core.DRIVE_DUTY), rng.uniform(0.5, 1.5, core.DRIVE_SIZE - core.DRIVE_DUTY))
-    links = (half @ half.T + np.eye(7), 1e-4 * other, rng.uniform(size=core.WEIGHT_SIZE), np.full(4, np.inf))
+    links = (1e-4 * other, rng.uniform(size=core.WEIGHT_SIZE), drive, half @ half.T + np.eye(7), np.full(4, np.inf))
     states = rng.normal(size=(10, core.STATE_SIZE))
     found = []
     for path in (native.library()._name, str(strict)):
@@ -63,8 +64,8 @@ def test_every_build_finds_the_same_numbers(strict: Path, wide: Any, monkeypatch
         numbers = []
         for pose, state in zip(poses, states, strict=True):
             matrix, change = np.empty((8, 8)), np.empty(core.STATE_SIZE)
-            stubs["resistance_at"](packed, *pose, matrix)
-            data = two_links.packed(*links, np.zeros((0, 6)), drive)
+            stubs["resistance_at"](table, *pose, matrix)
+            data = packed(*links)
             stubs["rates"](change, 0.7, state, data, np.zeros(0))
             numbers.append(np.concatenate([matrix.ravel(), change]))
         found.append(numbers)

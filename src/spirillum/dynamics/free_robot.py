@@ -14,7 +14,7 @@ the tips of the roughness; where one is thinner than the roughness is high, its 
 
 The correct form of (15) with its motor: seven rates (U, Omega_b, omega_m) against weight, buoyancy, friction, the
 torque of motor or field, and the fluid: here the films at the wall of a channel whose walls are otherwise left out, see
-`spirillum.kernels.two_links`; `tube_robot` has the walls.
+csrc/two_links.c; `tube_robot` has the walls.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import core
-from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
 from spirillum.robot.mesh import centreline_of
@@ -50,7 +49,7 @@ _STIFFEST = 1e10  # Largest resistance of a film over that of the robot, so that
 
 
 def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> tuple[Samples, Samples]:
-    """The channel's wall and the rings of a robot that may near it, as `kernels.two_links` reads them.
+    """The channel's wall and the rings of a robot that may near it, as csrc/two_links.c reads them.
 
     The wall (4,): radius of the channel (infinite: none), roughness, largest resistance of a film, and the load that
     halves a film as thick as the roughness. Rings (n, 6): x, radius, half-length along the axis, resistance, power,
@@ -221,6 +220,11 @@ class FreeRobot(ABC):
         return found
 
 
+def packed(*parts: Samples) -> Samples:
+    """One array for csrc/stiff_steps.c; it begins with what is observed, and serves one caller at a time."""
+    return np.concatenate([np.ravel(part) for part in (np.zeros(core.SEEN_SIZE), *parts)])
+
+
 def friction_of(batch: RobotBatch, reading: FrictionModel, effective: float) -> Samples:
     """The readings of (18) and (19) as torques against Omega_b about x (on the whole) and omega_m (in the joint)."""
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
@@ -280,7 +284,7 @@ def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoLinks(FreeRobot):
-    """A robot in unbounded fluid, with films between it and a channel's wall: see `spirillum.kernels.two_links`."""
+    """A robot in unbounded fluid, with films between it and a channel's wall: see csrc/two_links.c."""
 
     observed: ClassVar[int] = core.SEEN_CONTACT_FORCE
 
@@ -291,7 +295,7 @@ class TwoLinks(FreeRobot):
     @property
     def data(self) -> Samples:
         """All of them in one array."""
-        return kernel.packed(self.drag, self.friction, self.weight, self.wall, self.spots, self.drive)
+        return packed(self.friction, self.weight, self.drive, self.drag, self.wall, self.spots)
 
     @property
     def gap_count(self) -> int:

@@ -25,6 +25,7 @@ from spirillum.progress import Progress, tell
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
 _FIRST = 1e-4  # first step over the time of a turn
+RANGE_LEFT = "the range of the robot's table"  #: How the event of a robot that tilts beyond its table begins.
 END_OF_CHANNEL = "end of the channel"  #: Event of a robot whose nose or tail reaches the end of its channel.
 _STUCK = "no step is small enough"
 INTERRUPTED = "interrupted"  #: The event of a run that was interrupted, which keeps what was done.
@@ -63,7 +64,7 @@ class Trajectory:
     time: Samples  #: s, (n,).
     duty: Samples  #: Duty of the drive up to each sample, (n,).
     states: Samples  #: States, `State` of csrc/links.h, (n, 19).
-    observed: Samples  #: What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 31) observes.
+    observed: Samples  #: What is observed in them (n, 13), or (n, 31) in a tube.
     events: tuple[Event, ...]  #: What happened, in the order of time.
     last: Checkpoint
 

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import END_OF_CHANNEL
+from spirillum.dynamics.integration import END_OF_CHANNEL, RANGE_LEFT
 from spirillum.dynamics.timing import Switch
 from spirillum.envelope import envelope, interval, quantity
-from spirillum.kernels.tube_motion import RANGE_LEFT
 from spirillum.notes import Note, notes_in
 from spirillum.quantities import attributes
 from spirillum.swimming.released_motion import SteadyState

@@ -13,11 +13,19 @@ from typing import ClassVar
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.free_robot import ROUGHNESS_SHARE, FreeRobot, drive_of, friction_of, torque_scale, weight_of
+from spirillum.dynamics.free_robot import (
+    ROUGHNESS_SHARE,
+    FreeRobot,
+    drive_of,
+    friction_of,
+    packed,
+    torque_scale,
+    weight_of,
+)
+from spirillum.dynamics.integration import RANGE_LEFT
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import core
-from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.outline import profile_outline
 from spirillum.robot.robot import Robot
@@ -46,7 +54,7 @@ class Surroundings:
 
 @dataclass(frozen=True, kw_only=True)
 class TubeRobot(FreeRobot):
-    """A robot in its tube: see `spirillum.kernels.tube_motion`."""
+    """A robot in its tube: see csrc/tube_motion.c."""
 
     tolerance: float = 1e-7
     """Trajectory and pose of a minute in contact are then accurate to some parts in 1e7, energies to 1e-6; a tenth of
@@ -54,19 +62,19 @@ class TubeRobot(FreeRobot):
     """
     observed: ClassVar[int] = core.SEEN_SIZE
 
-    tube: Samples  #: The tube (9,), see `kernels.tube_motion`.
+    tube: Samples  #: The tube, `Tube` of csrc/motion.h, (9,) up to the numbers of sites and stations.
     wire: Samples  #: The wire, `Wire` of csrc/contacts.h, (6,).
     sites: Samples  #: Sites of body and coupling that can touch, `Site`, (n, 5).
     stations: Samples  #: Stations along the wires, `Station`, (m, 8).
-    flow: Samples  #: Imposed mean flow (k, 2).
+    flow: Samples  #: Imposed mean flow: times, s, and velocities, m/s, (k, 2).
     names: tuple[str, ...]  #: Names of the sites, and of the tail.
 
     @property
     def data(self) -> Samples:
         """All but the table in one array, for the compiled equations."""
-        return kernel.packed(
-            self.friction, self.weight, self.drive, self.tube, self.wire, self.sites, self.stations, self.flow
-        )
+        numbers = np.array([len(self.sites), len(self.stations)], dtype=float)
+        own = (self.tube, numbers, self.wire, self.sites, self.stations, self.flow)
+        return packed(self.friction, self.weight, self.drive, *own)
 
     @property
     def gap_count(self) -> int:
@@ -98,7 +106,7 @@ class TubeRobot(FreeRobot):
         name = _RANGES.get(int(seen[core.SEEN_OUTSIDE]), "place")
         offset, pitch, yaw = seen[[core.SEEN_OFFSET, core.SEEN_PITCH, core.SEEN_YAW]]
         return (
-            f"{kernel.RANGE_LEFT} in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
+            f"{RANGE_LEFT} in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
             f"{np.degrees(pitch):.3g} deg and a yaw of {np.degrees(yaw):.3g} deg against the wall"
         )
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import INTERRUPTED, Checkpoint, Event, Reach, Trajectory, integrate
+from spirillum.dynamics.integration import INTERRUPTED, RANGE_LEFT, Checkpoint, Event, Reach, Trajectory, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.start import reach_of
@@ -16,7 +16,6 @@ from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import core
-from spirillum.kernels import tube_motion as kernel
 from spirillum.notes import Note
 from spirillum.progress import Progress
 from spirillum.swimming.prediction import Prediction
@@ -105,7 +104,7 @@ def _waited(
     if wait <= 0.0:
         return state, ()
     run = integrate(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
-    if run.time[-1] < 0.0 and not run.events[-1].what.startswith(kernel.RANGE_LEFT):
+    if run.time[-1] < 0.0 and not run.events[-1].what.startswith(RANGE_LEFT):
         if run.events[-1].what == INTERRUPTED:
             raise KeyboardInterrupt
         raise InputError(
