@@ -14,7 +14,7 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks, two_links
-from spirillum.dynamics.start import start_state
+from spirillum.dynamics.release import start_state
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
 from spirillum.robot.placement import Placement

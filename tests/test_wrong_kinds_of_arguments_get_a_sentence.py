@@ -13,9 +13,9 @@ import pytest
 import spirillum as sp
 from spirillum.argument_validation import validate_arguments
 from spirillum.calibration.posterior import Sampling
+from spirillum.dynamics.release import InTube
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube
 from spirillum.robot.arguments import Options
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement

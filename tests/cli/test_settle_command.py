@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from spirillum.dynamics import settling, steady_state_search
+from spirillum.dynamics import free_motion, settling
 
 WIDE = "biorob2012-wide"
 QUICK = ("--roughness", "100um", "--set", "friction.effective=1.1e-5 N m s/rad")
@@ -68,7 +68,7 @@ def test_first_line_says_that_no_steady_motion_was_reached(
     run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without an error of numbers that are steady nowhere, and with roughness and friction as they were asked for."""
-    monkeypatch.setattr(steady_state_search, "_MOST_TURNS", 2)
+    monkeypatch.setattr(free_motion, "_MOST_TURNS", 2)
     asked = ("predict", WIDE, "--motion", "free", "--roughness", "50um", "--friction-coefficient", "0")
     tables = run(*asked)
     first = tables.out.partition("\n")[0]

@@ -13,11 +13,10 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.integration import Reach, integrate, observed_at
+from spirillum.dynamics.release import InTube, Release, read_flow, released_state, state_at_release
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import run_answer
-from spirillum.dynamics.start import released_state, state_at_release
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube, Release, read_flow
 from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
+from spirillum.dynamics.free_motion import Path, _around
 from spirillum.dynamics.return_map import STEPS, Turn
-from spirillum.dynamics.steady_state_search import Path, _around
 from spirillum.kernels import core
 from spirillum.swimming.released_motion import State, SteadyState
 

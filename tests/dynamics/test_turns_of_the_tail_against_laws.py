@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics.free_motion import long_run
+from spirillum.dynamics.release import state_at_release
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
-from spirillum.dynamics.start import state_at_release
-from spirillum.dynamics.steady_state_search import long_run
 from spirillum.dynamics.tube_robot import Surroundings, tube_robot
 from spirillum.robot.placement import Placement
 from spirillum.swimming.prediction import predict

@@ -129,8 +129,7 @@ def test_a_description_needs_masses(tmp_path: Path, unset: str, ending: str) -> 
 
 
 def test_more_triangles_than_mujoco_reads_are_refused() -> None:
-    from spirillum.exports.descriptions import check_triangles
-    from spirillum.exports.meshes import MeshFile
+    from spirillum.exports.descriptions import MeshFile, check_triangles
 
     check_triangles([MeshFile("wire", "rotor", None, 200_000, b"")])
     with pytest.raises(sp.InputError, match=r"wire\.stl would have 200001 triangles; allowed: at most 200000"):

@@ -123,7 +123,7 @@ def test_volume_of_the_printed_body_is_that_of_the_solids_and_what_joins_them() 
 
     The joint gains no more than half a ball and loses no more than the quarter of two crossing rods, 4/3 a^3.
     """
-    from spirillum.exports.meshes import united
+    from spirillum.exports.descriptions import united
 
     robot = sp.load(WIDE)
     coarse, fine = (united(robot_mesh(robot, fineness=fineness)).volume for fineness in (1.25, 2.5))

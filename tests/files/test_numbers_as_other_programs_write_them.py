@@ -6,8 +6,8 @@ import pytest
 
 from spirillum import InputError
 from spirillum.calibration.experiment import read_experiment
+from spirillum.dynamics.release import read_flow
 from spirillum.dynamics.timing import read_duty
-from spirillum.dynamics.tube_options import read_flow
 from spirillum.files import csv_rows
 from spirillum.files.reading import number_in
 from spirillum.measurement.observations import join_observations, observations_answer, read_observations

@@ -15,7 +15,7 @@ from spirillum.pages import simulation_thread as module
 from spirillum.pages.job import BackgroundJob, worker
 from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.simulation_thread import SimulationThread
-from spirillum.swimming import model_choice
+from spirillum.swimming import preparation
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ class Made:
 
 
 def test_a_robot_without_a_table_swims_provisionally_until_its_table_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model_choice, "has_table", lambda *_: bool(Made.requested) and not Made.requested[-1].running)
+    monkeypatch.setattr(preparation, "has_table", lambda *_: bool(Made.requested) and not Made.requested[-1].running)
     monkeypatch.setattr(module, "Preparing", Made)
     monkeypatch.setattr(module, "_UNTOUCHED", 0.1)
     Made.requested.clear()

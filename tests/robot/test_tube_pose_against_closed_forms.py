@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Outline, body_outline, cylinder_outline, solid_outlines
-from spirillum.robot.tube_pose import (
-    STEEPEST_PITCH,
-    TubePose,
-    contact_pitch,
-    largest_gap,
-)
+from spirillum.robot.tube_pose import STEEPEST_PITCH, TubePose, contact_pitch, largest_gap
 
 R = 0.02
 SHAPES: dict[str, Outline] = {

@@ -12,7 +12,7 @@ from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.published import paper_study
 from spirillum.studies import run
 from spirillum.studies.study_loader import LoadedStudy, load_study
-from spirillum.swimming.model_choice import choose_model
+from spirillum.swimming.preparation import choose_model
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.trial_options import MotionOptions
 from spirillum.worker_pool import WorkerPool

@@ -54,7 +54,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, WALLED, ModelChoice
+from spirillum.swimming.preparation import AUTO, IN_CHANNEL, WALLED, ModelChoice
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
 

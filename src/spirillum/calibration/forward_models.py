@@ -23,8 +23,8 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Samples, Values
 from spirillum.calibration.experiment import Experiment
+from spirillum.dynamics.release import InTube, Release
 from spirillum.dynamics.trial import quick_run, trial_means
-from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, prepared_tables, tables_of
@@ -45,8 +45,14 @@ from spirillum.swimming.balance import (
 from spirillum.swimming.band import band_poses
 from spirillum.swimming.drives import steady_current
 from spirillum.swimming.dry_friction import weights_in_fluid, with_dry_friction
-from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import checked_geometries, preparation_time, prepare_all, table_for
+from spirillum.swimming.preparation import (
+    WALLED,
+    checked_geometries,
+    has_table,
+    preparation_time,
+    prepare_all,
+    table_for,
+)
 from spirillum.swimming.sampled_resistance import DrawnResistance, Draws, TubeResistance
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from spirillum.envelope import interval
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.model_options import CALIBRATED
-from spirillum.swimming.model_choice import AUTO, WALLED
+from spirillum.swimming.preparation import AUTO, WALLED
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.progress import Progress
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
-from spirillum.swimming.model_choice import WALLED
+from spirillum.swimming.preparation import WALLED
 from spirillum.swimming.released_motion import HELD, RELEASED
 
 _CLEAR = 4.0  # difference of the log density, over its standard error, from which a model is better without doubt

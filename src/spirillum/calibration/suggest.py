@@ -44,10 +44,10 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import sampled_kinematics
-from spirillum.swimming.model_choice import fitted_with, has_table
+from spirillum.swimming.preparation import fitted_with, has_table
 from spirillum.swimming.released_motion import HELD, RELEASED
+from spirillum.swimming.scenario import calibration_warnings
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
 

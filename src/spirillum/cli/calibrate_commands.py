@@ -59,7 +59,7 @@ def calibrate(
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import renderer
     from spirillum.robot.arguments import set_fields
-    from spirillum.swimming.model_choice import AUTO
+    from spirillum.swimming.preparation import AUTO
     from spirillum.swimming.released_motion import RELEASED
 
     typed = request.typed

@@ -57,7 +57,7 @@ def _complete_laws(incomplete: str) -> list[str]:
             "spirillum.controllers.steering:KeepAxisTask",
             "spirillum.controllers.task:Task",
         ),
-        "placement": ("spirillum.robot.placement:Placement",),
+        "placement": ("spirillum.robot.tube_pose:Placement",),
     },
 )
 def control(

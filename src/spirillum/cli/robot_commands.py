@@ -57,7 +57,7 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     from spirillum.cli import renderer
     from spirillum.envelope import envelope
     from spirillum.robot.load import checked
-    from spirillum.swimming.model_choice import models_without_answer
+    from spirillum.swimming.preparation import models_without_answer
 
     problems, warnings = checked(robot, overrides_from(settings))
     if not problems:

@@ -35,8 +35,8 @@ from spirillum.controllers.task import (
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.record import run_attributes
+from spirillum.dynamics.release import reach_of
 from spirillum.dynamics.run_summary import vertical_drift
-from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_memory, check_range, did_you_mean
 from spirillum.fitted.fit import read_fit

@@ -23,7 +23,7 @@ from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import Controller, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.plant import Plant, uninterrupted
-from spirillum.dynamics.start import reach_of
+from spirillum.dynamics.release import reach_of
 from spirillum.errors import InputError
 from spirillum.progress import Progress
 from spirillum.robot.fields import Length, SignedLength

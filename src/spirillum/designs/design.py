@@ -24,9 +24,9 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.cautions import calibration_warnings, drive_warnings
-from spirillum.swimming.model_choice import AUTO, WALLED
+from spirillum.swimming.preparation import AUTO, WALLED
 from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
+from spirillum.swimming.scenario import calibration_warnings, drive_warnings
 from spirillum.swimming.steady import LEVEL, STEADY, Swimming, find_friction_model
 from spirillum.units import KINDS, parse_option, show
 

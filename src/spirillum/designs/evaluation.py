@@ -20,7 +20,7 @@ from spirillum.quantities import Quantity
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.steady import Swimming, requirements, swim
 
 

@@ -33,7 +33,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import joined
-from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
+from spirillum.swimming.preparation import AUTO, WALLED, ModelChoice, choose_model
 
 _COLUMNS = {
     "tail.wavelength": "wavelength",

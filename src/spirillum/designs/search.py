@@ -19,8 +19,7 @@ from spirillum.dynamics.prediction import predict
 from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import preparation_time, prepare_all
+from spirillum.swimming.preparation import WALLED, has_table, preparation_time, prepare_all
 from spirillum.swimming.released_motion import ReleasedMotion
 
 _GENERATIONS = 60

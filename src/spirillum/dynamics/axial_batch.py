@@ -21,7 +21,7 @@ from spirillum.robot.fields import kind_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, motor_current_problem
 from spirillum.scalars import is_whole
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.units import parse_option
 

@@ -41,8 +41,8 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.drives import packed_curve, winding_resistance
-from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.reynolds import (
     body_reynolds,
     check_stokes_flow,

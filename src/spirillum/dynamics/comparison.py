@@ -13,8 +13,8 @@ import numpy as np
 
 from spirillum.arrays import Axial, PerRobot
 from spirillum.display import DisplayMixin
+from spirillum.dynamics.release import InTube
 from spirillum.dynamics.trial import TrialRequest
-from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice
 from spirillum.fitted.fit import read_fit
@@ -29,8 +29,8 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
-from spirillum.swimming.model_choice import UNBOUNDED, WALLED
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.preparation import UNBOUNDED, WALLED
 from spirillum.swimming.steady import STEADY, find_friction_model, headline, swim
 
 LIGHTHILL = "sbt"  #: The theory from which the effects are counted.

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.free_motion import FreeMotion, means_over, prepare_release
+from spirillum.dynamics.free_motion import STABLE, FreeMotion, means_over, prepare_release
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
-from spirillum.dynamics.steady_state_search import STABLE
 from spirillum.errors import InputError
 from spirillum.fitted.fit import CALIBRATED_HELD, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
@@ -26,7 +25,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
 from spirillum.swimming.intervals import intervals_over, sampled_batch
-from spirillum.swimming.model_choice import ModelChoice, choose_model
+from spirillum.swimming.preparation import ModelChoice, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import PosteriorFor, sampled_discrepancy
 from spirillum.swimming.steady import LEVEL, Intervals, Swimming

@@ -20,16 +20,17 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot, TwoLinks
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTERRUPTED, Checkpoint, Reach, Trajectory, integrate
 from spirillum.dynamics.record import series_of, tail_angle_of
-from spirillum.dynamics.rotating_field import Field, TurningField
-from spirillum.dynamics.run_file import RobotPose
-from spirillum.dynamics.start import (
+from spirillum.dynamics.release import (
+    InTube,
+    Release,
     links_without_walls,
     reach_of,
     released_state,
     resting_state,
 )
+from spirillum.dynamics.rotating_field import Field, TurningField
+from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.timing import Switch
-from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
@@ -43,9 +44,8 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import table_for
+from spirillum.swimming.preparation import AUTO, choose_model, table_for
 from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, as_given, parse_option

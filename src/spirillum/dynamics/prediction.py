@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from spirillum.dynamics.release import InTube, check_not_resolved
 from spirillum.dynamics.trial import TrialRequest
-from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, FITTED_TRIAL, read_fit
 from spirillum.fluid.registry import find_swimmer_model
@@ -18,8 +18,8 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
-from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_posterior_medians
+from spirillum.swimming.preparation import AUTO, WALLED, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import posterior_for_of
 from spirillum.units import KINDS, as_given, parse_option

@@ -16,7 +16,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach, Steps, observed_at, watched_limits
-from spirillum.dynamics.start import state_at
+from spirillum.dynamics.release import state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import core

@@ -33,8 +33,8 @@ from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO, NO_CHANNEL, UNBOUNDED, ModelChoice
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.preparation import AUTO, NO_CHANNEL, UNBOUNDED, ModelChoice
 from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import (
     body_reynolds,

@@ -21,8 +21,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
+from spirillum.dynamics.release import InTube
 from spirillum.dynamics.run_summary import state_of
-from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import read_fit
@@ -35,8 +35,8 @@ from spirillum.progress import Progress
 from spirillum.quantities import in_units
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import IN_CHANNEL
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.preparation import IN_CHANNEL
 from spirillum.swimming.released_motion import SteadyState
 from spirillum.units import KINDS, parse_option
 

@@ -13,11 +13,18 @@ from spirillum.dynamics.axial_robot import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
 from spirillum.dynamics.integration import integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
+from spirillum.dynamics.release import (
+    InTube,
+    Release,
+    check_not_resolved,
+    links_without_walls,
+    reach_of,
+    resting_state,
+    turning_rate,
+)
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
 from spirillum.dynamics.run_summary import vertical_drift
-from spirillum.dynamics.start import links_without_walls, reach_of, resting_state, turning_rate
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube, Release, check_not_resolved
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, NO_FIT, Fit, read_fit
@@ -33,12 +40,11 @@ from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.cautions import NO_WEIGHT
-from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import table_for
+from spirillum.swimming.preparation import AUTO, table_for
 from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
+from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.swimming.steady import find_friction_model, requirements
 from spirillum.units import as_given
 

@@ -20,10 +20,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.data_tables import rows_of
+from spirillum.dynamics.release import InTube, Release
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import is_held, state_of
 from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
-from spirillum.dynamics.tube_options import InTube, Release
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_BESIDE, NO_FIT, Fit
@@ -41,9 +41,8 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
-from spirillum.swimming.preparation import preparation_time, table_for, why_no_table
+from spirillum.swimming.preparation import WALLED, has_table, preparation_time, table_for, why_no_table
 from spirillum.swimming.released_motion import ASSUMPTION, HELD, SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import PosteriorFor
@@ -326,7 +325,7 @@ class TrialRequest:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
         release, channel = self._release, self.robot.channel
         if release.roughness is not None and channel is not None:
-            from spirillum.dynamics.start import check_roughness  # loads compiled loops
+            from spirillum.dynamics.release import check_roughness  # loads compiled loops
 
             diameter = self.robot.body.diameter
             gap = gap_of(release.placement, diameter, 0.5 * channel.diameter)

@@ -10,8 +10,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import INTERRUPTED, RANGE_LEFT, Checkpoint, Event, Reach, Trajectory, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
+from spirillum.dynamics.release import reach_of
 from spirillum.dynamics.run_file import numbers_of
-from spirillum.dynamics.start import reach_of
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.release import InTube, Release, check_roughness, read_flow, released_state, turning_rate
 from spirillum.dynamics.rotating_field import Field, in_tilted_field
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.run_summary import end_state
-from spirillum.dynamics.start import check_roughness, released_state, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
-from spirillum.dynamics.tube_options import InTube, Release, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.errors import InputError
@@ -29,10 +28,10 @@ from spirillum.progress import Progress
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.swimming.preparation import check_usual_resolution
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
+from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.units import show, show_height
 
 if TYPE_CHECKING:

@@ -16,14 +16,17 @@ from spirillum.dynamics.axial_robot import axial_robot
 from spirillum.dynamics.plant import Plant
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.errors import InputError, check_choice
-from spirillum.exports.descriptions import check_inertia, mjcf_text, sidecar_of, urdf_text
-from spirillum.exports.meshes import (
+from spirillum.exports.descriptions import (
     UnitedBody,
+    check_inertia,
     is_watertight,
     is_watertight_file,
     mesh_files,
+    mjcf_text,
+    sidecar_of,
     stl_bytes,
     united,
+    urdf_text,
     vtp_bytes,
 )
 from spirillum.files import MARK, atomic_write_all, guard_inputs, output_folder, output_target
@@ -35,7 +38,7 @@ from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import corner_normals
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:

@@ -27,9 +27,8 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import TubePose
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import prepared
+from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared
 from spirillum.units import KINDS, parse_option
 from spirillum.version import versions
 

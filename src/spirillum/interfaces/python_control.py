@@ -21,7 +21,7 @@ from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.units import KINDS, as_given, parse_option
 
 if TYPE_CHECKING:

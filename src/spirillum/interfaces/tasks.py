@@ -23,7 +23,7 @@ from spirillum.kernels import core
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO, choose_model
+from spirillum.swimming.preparation import AUTO, choose_model
 from spirillum.units import KINDS, parse_option
 
 _MM = 1e3

@@ -230,8 +230,8 @@ def _expected(
     found = {name: (value, "given") for name, value in given.items() if value is not None}
     if len(found) == len(given):
         return {name: found[name] for name in given}, ()
-    from spirillum.swimming.model_choice import AUTO, choose_model
     from spirillum.swimming.prediction import predict
+    from spirillum.swimming.preparation import AUTO, choose_model
     from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:

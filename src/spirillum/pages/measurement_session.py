@@ -24,7 +24,7 @@ from spirillum.pages.video_store import VideoStore, plain, plain_names
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.model_options import CALIBRATED
 from spirillum.robot.robot import Robot, robot_text
-from spirillum.swimming.model_choice import AUTO, WALLED
+from spirillum.swimming.preparation import AUTO, WALLED
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:

@@ -115,7 +115,7 @@ class Built:
 def build(settings: Settings, robot: Robot) -> Built:
     """Lay a robot down; until the table of its tube is made it swims provisionally by a model without walls."""
     from spirillum.dynamics.plant import Plant  # loads compiled loops: the page is there before
-    from spirillum.swimming.model_choice import UNBOUNDED, WALLED, choose_model, has_table
+    from spirillum.swimming.preparation import UNBOUNDED, WALLED, choose_model, has_table
 
     placed = settings.placement()
     if robot.drive is None:

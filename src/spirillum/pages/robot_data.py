@@ -17,7 +17,7 @@ from spirillum.robot.mesh import COLOURS, RobotMesh, robot_mesh
 from spirillum.robot.outline import Arc, Segment
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import corner_normals
-from spirillum.swimming.model_choice import WALLED
+from spirillum.swimming.preparation import WALLED
 from spirillum.units import display_unit, shown_in
 
 if TYPE_CHECKING:

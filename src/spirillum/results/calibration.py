@@ -26,7 +26,7 @@ from spirillum.progress import Progress, tell
 from spirillum.results.page import Drawings, draw_together, load_figures
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.version import versions
 from spirillum.worker_pool import process_beside
 

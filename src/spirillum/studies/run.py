@@ -49,9 +49,8 @@ from spirillum.studies.released_robots import (
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
-from spirillum.swimming.cautions import CONSTANT_TORQUE, calibration_warnings
-from spirillum.swimming.model_choice import has_table
-from spirillum.swimming.preparation import missing_tables
+from spirillum.swimming.preparation import has_table, missing_tables
+from spirillum.swimming.scenario import CONSTANT_TORQUE, calibration_warnings
 from spirillum.swimming.steady import requirements
 from spirillum.version import package_version
 from spirillum.worker_pool import ESTIMATE, WorkerPool, map_tasks

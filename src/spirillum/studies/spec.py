@@ -14,7 +14,7 @@ from spirillum.robot.fields import Length, Rate, Section, Text, Time, refuse
 from spirillum.robot.placement import Placement
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.units import Hz, show_height
 
 _MOST_ROBOTS = 100_000  # most robots that are loaded one by one

@@ -33,7 +33,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, UNBOUNDED, WALLED, ModelChoice, choose_model
+from spirillum.swimming.preparation import AUTO, IN_CHANNEL, UNBOUNDED, WALLED, ModelChoice, choose_model
 from spirillum.units import show_apart
 
 LARGEST_STUDY = 5_000_000  #: Most results (robots times models times friction models times rates) of one study.
@@ -204,7 +204,7 @@ def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
     """Refuse asperities that would carry more than the weight of a released robot."""
     if not (study.settled or study.trial) or study.contact.roughness is None:
         return
-    from spirillum.dynamics.start import check_roughness  # loads compiled loops
+    from spirillum.dynamics.release import check_roughness  # loads compiled loops
 
     for robot in robots:
         if robot.channel is not None:

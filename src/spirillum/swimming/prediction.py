@@ -29,13 +29,10 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.band import Band, band_of
-from spirillum.swimming.cautions import no_band_warnings
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
-from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.preparation import prepared, why_no_table
+from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared, why_no_table
 from spirillum.swimming.released_motion import Motion, ReleasedMotion, SteadyState, motion_of
 from spirillum.swimming.sampled_resistance import PosteriorFor, posterior_for_of
-from spirillum.swimming.scenario import Scenario
+from spirillum.swimming.scenario import OtherModels, Scenario, no_band_warnings, other_models
 from spirillum.swimming.steady import STEADY, Intervals, Swimming, find_friction_model, headline
 from spirillum.units import KINDS, parse_option
 

@@ -1,24 +1,147 @@
-"""A case of steady motion: robot, pose, model, fit, drive and friction model, its motion, errors and cautions."""
+"""A case of steady motion: its errors, its cautions, and what models that leave out effects predict beside it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from spirillum.envelope import quantity
 from spirillum.fitted.fit import Fit
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import broken
+from spirillum.robot.limits import Limit, broken
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
-from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, drive_warnings, film_limits
+from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.band import left_open
 from spirillum.swimming.dry_friction import swim_on_floor
+from spirillum.swimming.preparation import has_table, preparation_time, why_no_table
+from spirillum.swimming.released_motion import Motion
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.steady import Swimming, calibrated_balance, speed_error
+from spirillum.swimming.steady import Swimming, calibrated_balance, requirements, speed_error, swim
 from spirillum.units import show
+
+NO_WEIGHT = Note.named("no-masses")  #: Caution of a free motion of a robot whose masses are unknown.
+
+
+def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
+    """What has to hold for the answer to be accurate; each broken one is a warning."""
+    return [*model.cautions(batch), *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number)]
+
+
+def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Swimming) -> list[Limit]:
+    """What has to hold for the linear film under a body that is held near the wall: the liquid does not cavitate.
+
+    Under a turning cylinder the least pressure is -1.837 mu u sqrt(R')/h^1.5, with u = a Omega/2, R' = a R/(R - a).
+    """
+    bound, channel = robot.fluid.cavitation_pressure, robot.channel
+    if not model.placed or bound is None or channel is None or robot.body.diameter >= channel.diameter:
+        return []
+    a, radius = 0.5 * robot.body.diameter, 0.5 * channel.diameter
+    pulled = 0.5 * robot.fluid.viscosity * a * np.abs(result.body_rotation_rate)
+    least = (1.837 * pulled * np.sqrt(a * radius / (radius - a)) / bound) ** (2.0 / 3.0)
+    gap = np.atleast_1d(gap_of(batch.placement, 2.0 * a, radius))
+    return [Limit.named("cavitation", gap, least)]
+
+
+def calibration_warnings(robot: Robot, model: str) -> list[Note]:
+    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
+
+    A model that computes the walls takes none.
+    """
+    if find_swimmer_model(model).placed:
+        return []
+    entry = robot.calibration.get(model)
+    if entry is None:
+        return [] if robot.channel is None else [Note.named("not-calibrated", model=model)]  # no walls to represent
+    fitted = entry.fitted_to
+    channel = robot.channel.diameter if robot.channel else None
+    pairs = (
+        ("channel.diameter", channel, fitted.channel_diameter),
+        ("body.diameter", robot.body.diameter, fitted.body_diameter),
+        ("body.length", robot.body.length, fitted.body_length),
+    )
+    differing = [
+        f"{name} = {'none' if value is None else show(value, 'mm')} (fitted to {show(fit, 'mm')})"
+        for name, value, fit in pairs
+        if value is None or not np.isclose(value, fit, rtol=1e-6)
+    ]
+    if not differing:
+        return []
+    more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
+    fields = [words.partition(" = ")[0] for words in differing]
+    return [Note.named("calibrated-elsewhere", model=model, differs=differing[0], more=more, fields=fields)]
+
+
+def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
+    """Limits of an answer at one pose of several, with the remedy; nothing where the pose is known."""
+    over = left_open(batch.pose, model)
+    if not over:
+        return []
+    named = f"{' and '.join(over)} {'is' if len(over) == 1 else 'are'}"
+    more = "--band gives the band over them, in minutes"
+    if not has_table(batch) and not why_no_table(batch):
+        whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
+        band = band.partition(" on ")[0]
+        more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
+    return [Note.named("pose-open", open=named, more=more, fields=over)]
+
+
+CONSTANT_TORQUE = Note.named("constant-torque")  #: What a drive of given torque takes for granted.
+
+
+def drive_warnings(
+    robot: Robot, model: SwimmerModel, reading: FrictionModel, result: Swimming, rate: float | None
+) -> list[Note]:
+    """Warnings about friction, rate and drive of an answer."""
+    motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
+    step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
+    if np.isfinite(step_out) and not follows:
+        return [Note.named("field-slips", rate=show(step_out, "Hz"))]
+    factors = robot.calibration.get(model.name)
+    found = []
+    if reading == "paper" and factors is not None and factors.body_rotation < 1:
+        found.append(Note.named("friction-twice", model=model.name, factor=factors.body_rotation))
+    if rate is None and robot.drive is not None and robot.drive.kind == "torque":
+        found.append(CONSTANT_TORQUE)
+    if not motor_driven:
+        return found
+    if rate is None:
+        return found + _unset_friction_warning(robot, reading)
+    return found + _prescribed_rate_warnings(robot, reading, result)
+
+
+def _unset_friction_warning(robot: Robot, reading: FrictionModel) -> list[Note]:
+    if reading == "none":
+        return [Note.named("frictionless-motor")]
+    if robot.friction.effective is not None or robot.motor is None:
+        return []
+    name = "B_m" if robot.motor.gear_ratio == 1 else "B_m G^2"
+    own = f"{name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
+    return [Note.named("no-wall-friction" if reading == "body" else "rotor-friction-alone", own=own)]
+
+
+def _prescribed_rate_warnings(robot: Robot, reading: FrictionModel, result: Swimming) -> list[Note]:
+    found = []
+    if reading in ("rotor", "paper"):
+        if robot.friction.effective is not None:
+            found.append(Note.named("friction-inferred"))
+        reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+        if float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0:
+            found.append(Note.named("against-motor"))
+        elif result.effective_friction[0] < 0:
+            found.append(Note.named("friction-negative"))
+    else:
+        found.append(Note.named("torque-left", reading=reading, torque=result.motor_residual_torque[0]))
+    if result.electrical_power[0] < 0:
+        found.append(Note.named("motor-driven"))
+    return found
 
 
 @dataclass(frozen=True)
@@ -116,3 +239,87 @@ class Scenario:
                 f"E_x = {limit:.4g} N m s/rad with friction model 'paper', which would turn the tail backwards"
             )
         return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
+
+
+@dataclass(frozen=True)
+class OtherModel:
+    """Speed of a robot by another model."""
+
+    model: str
+    calibrated: bool  #: Whether the robot's calibration factors, which represent the walls, were applied.
+    forward_velocity: float  #: U, m/s.
+    ratio: float  #: U over that of the answer beside which it stands.
+
+
+@dataclass(frozen=True)
+class OtherModels:
+    """Predictions of simpler models for the same request."""
+
+    answers: tuple[OtherModel, ...]
+    """One for each model, and one more for each that has calibration factors of this geometry."""
+    statement: str  #: All in one line, and why they differ.
+
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in JSON."""
+        answers = [
+            {
+                "model": item.model,
+                "calibrated": item.calibrated,
+                "forward_velocity": quantity(item.forward_velocity, "m/s"),
+                "ratio": quantity(item.ratio, "1"),
+            }
+            for item in self.answers
+        ]
+        return {"statement": self.statement, "answers": answers}
+
+
+def other_models(
+    robot: Robot,
+    model: SwimmerModel,
+    speed: float,
+    *,
+    tail_rate: float | None,
+    friction: FrictionModel,
+    motion: Motion,
+    flow: float | None,
+) -> OtherModels | None:
+    """Predictions of models that leave out effects which the answering one includes; None where none is comparable."""
+    if model.closed_form or flow is not None or not math.isfinite(speed) or speed == 0:
+        return None
+    simpler = [
+        other
+        for other in SWIMMER_MODELS.values()
+        if other.name != model.name and not other.placed and (model.placed or other.closed_form)
+    ]
+    batch = RobotBatch.of(robot)
+    rates = None if tail_rate is None else np.array([tail_rate])
+    found = []
+    for other in simpler:
+        if (motion == "free" and other.axial_only) or broken(requirements(batch, other)):
+            continue
+        of_this = other.name in robot.calibration and not calibration_warnings(robot, other.name)
+        for calibrated in (False, True) if of_this else (False,):
+            result = swim(batch, other, tail_rate=rates, friction=friction, calibrated=calibrated, motion=motion)
+            own = float(result.forward_velocity[0])
+            if result.valid[0] and own / speed > 0:
+                found.append(OtherModel(other.name, calibrated, own, own / speed))
+    coupled = robot.coupling.length > 0.0
+    return OtherModels(tuple(found), _statement(found, model, coupled=coupled)) if found else None
+
+
+def _statement(found: list[OtherModel], model: SwimmerModel, *, coupled: bool) -> str:
+    bare = _times([item for item in found if not item.calibrated])
+    lacking = f"{'the coupling and ' if coupled else ''}the flow between body and tail"
+    if not model.placed:
+        return f"closed forms predict {bare}: they leave out {lacking}"
+    fitted = [item for item in found if item.calibrated]
+    more = f"; with calibration factors, which represent the walls, {_times(fitted)}" if fitted else ""
+    names = [name for name in dict.fromkeys(item.model for item in found) if SWIMMER_MODELS[name].closed_form]
+    leave = f"{' and '.join(names)} {'leaves' if len(names) == 1 else 'leave'}"
+    apart = f" ({leave} out {lacking}, too)" if names else ""
+    return f"models without walls predict {bare}{apart}{more}"
+
+
+def _times(items: list[OtherModel]) -> str:
+    names = ", ".join(f"{item.model} {item.ratio:.2g}" for item in items)
+    return f"{names} times this speed"

@@ -38,7 +38,7 @@ from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.units import Hz
 from spirillum.version import package_version
 from spirillum.virtual.artifacts import Degradation

@@ -33,7 +33,7 @@ from spirillum.progress import Progress, tell
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.version import versions
 from spirillum.virtual.artifacts import (
