@@ -15,7 +15,6 @@ import numpy as np
 import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.release import start_state
-from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
 from spirillum.robot.placement import Placement
 
@@ -44,16 +43,7 @@ def main() -> None:
     for length in TRIALS:
         timing = {"duration": length}
         in_tube[length] = best(lambda timing=timing: sp.simulate(robot, timing=timing, in_tube={"wait": 0.0}), 3)
-    links = two_links(
-        robot,
-        sp.RobotBatch.of(robot),
-        find_swimmer_model("rft"),
-        friction="rotor",
-        effective=1.1e-5,
-        calibrated=True,
-        weight=True,
-        roughness=None,
-    )
+    links = two_links(sp.predict(robot, model="rft", friction="rotor", motion="held"), None, weight=True)
     data, no_table, dy = links.data, links.table, np.empty(core.STATE_SIZE)
 
     def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:

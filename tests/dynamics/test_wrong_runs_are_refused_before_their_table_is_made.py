@@ -32,7 +32,7 @@ def no_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         ({"timing": {"duration": "-1 s"}}, 'duration = "-1 s" is out of range'),
         ({"timing": {"turns": 0.0}}, "turns = 0.0; allowed"),
         ({"timing": {"turns": float("nan"), "duration": "1 s"}}, "turns = nan; allowed"),
-        ({"timing": {"samples_per_turn": 0}}, "samples-per-turn = 0; allowed"),
+        ({"timing": {"samples_per_turn": 0}}, "samples_per_turn = 0; allowed"),
         ({"timing": {"on": [("1 s", "0 s")]}}, "on = 1 s to 0 s; allowed"),
         ({"timing": {"duty": "nowhere.csv"}}, "nowhere.csv does not exist"),
         ({"friction": "bad"}, "friction = 'bad'; allowed"),

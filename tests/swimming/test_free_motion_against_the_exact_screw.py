@@ -22,16 +22,7 @@ def robot(**overrides: Any) -> sp.Robot:
 
 
 def links_of(built: sp.Robot, model: str = "rft") -> TwoLinks:
-    return two_links(
-        built,
-        sp.RobotBatch.of(built),
-        find_swimmer_model(model),
-        friction="rotor",
-        effective=1.1e-5,
-        calibrated=False,
-        weight=False,
-        roughness=None,
-    )
+    return two_links(sp.predict(built, model=model, friction="rotor", calibrated=False), None, weight=False)
 
 
 @pytest.mark.parametrize("model", ["rft", "slender"])

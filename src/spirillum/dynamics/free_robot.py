@@ -27,7 +27,6 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import core
 from spirillum.robot.batch import RobotBatch
@@ -38,6 +37,7 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.drives import packed_curve
+from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.released_motion import LINKS
 from spirillum.swimming.steady import calibrated_resistance
 
@@ -317,26 +317,17 @@ class TwoLinks(FreeRobot):
         return "film as thin as the roughness"
 
 
-def two_links(
-    robot: Robot,
-    batch: RobotBatch,
-    model: SwimmerModel,
-    *,
-    friction: FrictionModel,
-    effective: float,
-    calibrated: bool,
-    weight: bool,
-    roughness: float | None,
-) -> TwoLinks:
-    """Everything that a robot's rates follow from."""
-    resistance = calibrated_resistance(batch, model, calibrated=calibrated)[0]
+def two_links(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
+    """Everything that a robot's rates in unbounded fluid follow from, with films between it and a channel's wall."""
+    robot, batch, effective = steady.robot, steady.batch, steady.effective_friction
+    resistance = calibrated_resistance(batch, steady.model, calibrated=steady.calibrated)[0]
     drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
     heavy, drive = weight_of(robot) if weight else np.zeros(core.WEIGHT_SIZE), drive_of(batch)
     length, torque = float(np.sqrt(drag[4, 4] / drag[1, 1])), torque_scale(drag, heavy, drive)
     wall, spots = films_of(robot, roughness, float(drag[1, 1]), torque / length)
     return TwoLinks(
         drag=drag,
-        friction=friction_of(batch, friction, effective),
+        friction=friction_of(batch, steady.friction, 0.0 if np.isnan(effective) else effective),
         weight=heavy,
         wall=wall,
         spots=spots,

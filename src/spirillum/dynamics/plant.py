@@ -17,13 +17,12 @@ import numpy as np
 
 from spirillum.argument_validation import as_number, check_kind, validate_arguments
 from spirillum.arrays import Samples
-from spirillum.dynamics.free_robot import FreeRobot, TwoLinks
+from spirillum.dynamics.free_robot import FreeRobot, TwoLinks, two_links
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTERRUPTED, Checkpoint, Reach, Trajectory, integrate
 from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.release import (
     InTube,
     Release,
-    links_without_walls,
     reach_of,
     released_state,
     resting_state,
@@ -155,7 +154,7 @@ class Plant:
         self._reach = reach_of(own)
         self._links: FreeRobot
         if self._table is None:
-            self._links = without_walls = links_without_walls(self.steady, release.roughness, weight=weight)
+            self._links = without_walls = two_links(self.steady, release.roughness, weight=weight)
             first = resting_state(own, without_walls, release.placement)
         else:
             self._links = links = links_in_tube(self.steady, self._table, release)

@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.integration import BATTERY_EMPTY, Reach, Trajectory
+from spirillum.dynamics.run_file import rotation_matrix
 from spirillum.dynamics.run_summary import STEADY, run_averages, stretches_on
 from spirillum.dynamics.timing import Switch
 from spirillum.kernels import core
@@ -131,10 +132,7 @@ def free_attributes(
 
 def _rotations(states: Samples) -> Samples:
     """Rotation matrices, body axes to lab, (n, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    attitude = states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4]
-    return np.asarray(Rotation.from_quat(attitude, scalar_first=True).as_matrix())
+    return rotation_matrix(states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4])
 
 
 def tail_angle_of(states: Samples, begun: float) -> Samples:

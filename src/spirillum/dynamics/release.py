@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.free_robot import TwoLinks, two_links
+from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import Reach, observed_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
@@ -18,7 +18,7 @@ from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fluid.tube.library import THINNEST_GAP
 from spirillum.formats.tables import read_series
 from spirillum.kernels import core
-from spirillum.robot.arguments import Options, in_range, refusal
+from spirillum.robot.arguments import Options, file_path, in_range
 from spirillum.robot.fields import Angle, Time
 from spirillum.robot.geometry import Channel
 from spirillum.robot.links import outlines_of
@@ -38,17 +38,6 @@ _LARGEST = 64 << 20
 _LIMITS = dict(zip(FLOW_COLUMNS, ((0.0, 1e9), (-1e6, 1e6)), strict=True))
 
 
-def _file(what: str) -> BeforeValidator:
-    """None, or the path of a file that is described in these words."""
-
-    def path(value: Any) -> Any:
-        if not (value is None or isinstance(value, (str, Path))):
-            raise refusal(f"= {str(value)[:40]}; allowed: {what}")
-        return value
-
-    return BeforeValidator(path)
-
-
 class InTube(Options):
     """Start, surroundings and contact of a run in a tube, beside its placement."""
 
@@ -62,9 +51,9 @@ class InTube(Options):
     """Waiting time after release with the drive off, before the run; None: 60 s, as in a trial, in a flow none."""
     friction_coefficient: Annotated[float | None, BeforeValidator(in_range(0.0, 10.0))] = None
     """Coefficient of dry friction where asperities touch; None: 0.1, assumed; plausible 0 to 0.3, allowed 0 to 10."""
-    flow: Annotated[str | Path | None, _file("a flow file; a constant flow is placement.flow")] = None
+    flow: Annotated[str | Path | None, file_path("a flow file; a constant flow is placement.flow")] = None
     """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
-    continued: Annotated[str | Path | None, _file("the file of a run in a tube, by `spirillum simulate`")] = None
+    continued: Annotated[str | Path | None, file_path("the file of a run in a tube, by `spirillum simulate`")] = None
     """File of a run of the robot that ended early, continued after its last sample as if it had not ended."""
 
     def of_trial(self, placed: Placement) -> InTube:
@@ -197,21 +186,6 @@ def turning_rate(steady: Prediction) -> float:
         field = "magnetic.rotation_rate" if kind == "magnetic" else f"drive.{kind}"
         raise InputError(f"{field} = 0: the tail does not turn; allowed: any other, and `on` for switching off")
     return abs(rate)
-
-
-def links_without_walls(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
-    """Inputs of a robot's rates in unbounded fluid, with lubrication films between it and a channel's wall."""
-    effective = steady.effective_friction
-    return two_links(
-        steady.robot,
-        steady.batch,
-        steady.model,
-        friction=steady.friction,
-        effective=0.0 if np.isnan(effective) else effective,
-        calibrated=steady.calibrated,
-        weight=weight,
-        roughness=roughness,
-    )
 
 
 def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Samples:

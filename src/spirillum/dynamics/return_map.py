@@ -33,7 +33,13 @@ _COUNTED = [core.STATE_POSITION, core.STATE_ROLL, *range(core.STATE_CURRENT + 1,
 """What counts from the start of a turn."""
 
 STEPS = ("time", "x", "roll", "gap", "azimuth", "pitch", "yaw", "contact_force", "offset")
-"""What is noted at every step; azimuth between -pi and pi."""
+"""What is noted at every step: the time, two components of the state, and what is observed of it."""
+_OF_STATE = [core.STATE_POSITION, core.STATE_ROLL]
+_SEEN = [
+    *(core.SEEN_FILM, core.SEEN_AZIMUTH, core.SEEN_PITCH, core.SEEN_YAW),
+    *(core.SEEN_CONTACT_FORCE, core.SEEN_OFFSET),
+]
+"""What is observed in the order of `STEPS`; azimuth between -pi and pi."""
 
 _SIZES = np.array([1.0, 0.1, 100.0, 1.0])
 """Weights of azimuth (rad), logarithm of the gap, pitch (rad) and yaw (rad) in the size of a change."""
@@ -92,7 +98,7 @@ class ReturnMap:
         core.watched(y, 0.0, data, robot.table, limits, robot.roughness, run.gaps)
         nothing, none = np.empty(0), np.empty((0, core.STATE_SIZE))
         begun = observed_at(robot, y)[core.SEEN_TURN], y[core.STATE_PHASE]
-        noted: list[tuple[float, ...]] = []
+        noted: list[Samples] = []
         jacobians: list[Samples] = []
         while self._turned(y, data[core.SEEN_TURN], begun) < 2.0 * np.pi or not noted:
             status = core.advance(
@@ -102,7 +108,7 @@ class ReturnMap:
             self.steps[0] += 1
             if words := self._ended(status, y, run.time, run.gaps):
                 raise EndedTurnError(words, _part(run.before, noted, jacobians))
-            noted.append(_noted(run.time, y, data))
+            noted.append(np.concatenate([[run.time], y[_OF_STATE], data[_SEEN]]))
             jacobians.append(run.jacobian.copy())
         end, share = self._at_the_angle(run.before, y, run.increments, begun)
         time = run.last.time + share * (run.time - run.last.time)
@@ -145,12 +151,12 @@ class ReturnMap:
         return inner.copy(), share
 
 
-def _part(state: Samples, noted: list[tuple[float, ...]], jacobians: list[Samples]) -> Turn | None:
+def _part(state: Samples, noted: list[Samples], jacobians: list[Samples]) -> Turn | None:
     """A turn as far as it was followed."""
     if len(noted) < 2:
         return None
     steps = np.array(noted)
-    return Turn(state.copy(), noted[-1][0], steps, _tangent(np.array([0.0, *steps[:, 0]]), np.array(jacobians)))
+    return Turn(state.copy(), float(steps[-1, 0]), steps, _tangent(np.array([0.0, *steps[:, 0]]), np.array(jacobians)))
 
 
 def _tangent(times: Samples, jacobians: Samples) -> Samples:
@@ -160,17 +166,6 @@ def _tangent(times: Samples, jacobians: Samples) -> Samples:
     after = np.concatenate([jacobians[1:], jacobians[-1:]])
     factors = expm(np.diff(times)[:, None, None] * 0.5 * (jacobians + after))
     return reduce(lambda total, factor: factor @ total, factors)
-
-
-def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:
-    return (
-        time,
-        float(y[core.STATE_POSITION]),
-        float(y[core.STATE_ROLL]),
-        *(float(data[index]) for index in (core.SEEN_FILM, core.SEEN_AZIMUTH, core.SEEN_PITCH, core.SEEN_YAW)),
-        float(data[core.SEEN_CONTACT_FORCE]),
-        float(data[core.SEEN_OFFSET]),
-    )
 
 
 class FixedPoint(NamedTuple):

@@ -20,6 +20,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot, TwoLinks, two_links
 from spirillum.dynamics.integration import Reach, integrate
+from spirillum.dynamics.run_file import rotation_matrix
 from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError, check_range
 from spirillum.fluid.registry import find_swimmer_model
@@ -207,16 +208,7 @@ def magnetic_sweep(
     batch = replace(held.batch, options=own.model)
     closed = swim(held.batch.with_values({"magnetic.rotation_rate": requested}), held.model, calibrated=False)
     inertia = _check_stokes(batch, requested, closed.forward_velocity, closed.tail_rotation_rate)
-    links = two_links(
-        held.robot,
-        held.batch,
-        held.model,
-        friction="none",
-        effective=0.0,
-        calibrated=False,
-        weight=False,
-        roughness=None,
-    )
+    links = two_links(held, None, weight=False)
     level: Samples = np.array([1.0, 0.0, 0.0, 0.0])
     attitude: Samples = level
     found, settled = [], []
@@ -324,10 +316,7 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
 
 
 def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
-    from scipy.spatial.transform import Rotation
-
-    attitudes = Rotation.from_quat(states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4], scalar_first=True)
-    rotation = np.asarray(attitudes.as_matrix())
+    rotation = rotation_matrix(states[:, core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4])
     moment = rotation @ links.drive[core.DRIVE_MOMENT : core.DRIVE_FIELD]
     behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     slipped = behind - behind[0]

@@ -140,15 +140,10 @@ def rolled(angle: float) -> Samples:
 
 
 def rotation_matrix(quaternion: Samples) -> Samples:
-    """3x3 matrix of a unit quaternion w, x, y, z."""
-    w, x, y, z = (float(value) for value in quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    """Rotation matrices, (..., 3, 3), of unit quaternions w, x, y, z, (..., 4)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
 
 
 @dataclass(frozen=True)
@@ -178,23 +173,15 @@ class Poses:
 
     def at(self, time: float) -> RobotPose:
         """The pose at a time, between samples in straight lines and even turns."""
+        from scipy.spatial.transform import Rotation, Slerp
+
         index = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2))
-        step = float(self.time[index + 1] - self.time[index])
-        share = float(np.clip((time - self.time[index]) / step, 0.0, 1.0))
-
-        def between(values: Samples) -> Samples:
-            return np.asarray(values[index] + share * (values[index + 1] - values[index]))
-
-        start = self.attitude[index]
-        end = self.attitude[index + 1]
-        cosine = float(np.clip(start @ end, -1.0, 1.0))
-        angle = np.arccos(cosine)
-        if angle < 1e-6:
-            mixed = (1.0 - share) * start + share * end
-        else:
-            mixed = (np.sin((1.0 - share) * angle) * start + np.sin(share * angle) * end) / np.sin(angle)
-        attitude = np.asarray(mixed / np.linalg.norm(mixed))
-        return RobotPose(between(self.position), attitude, float(between(self.tail_phase)))
+        pair = slice(index, index + 2)
+        times, turns = self.time[pair], Rotation.from_quat(self.attitude[pair], scalar_first=True)
+        moment = float(np.clip(time, *times))
+        position = np.array([np.interp(moment, times, along) for along in self.position[pair].T])
+        attitude = Slerp(times, turns)(moment).as_quat(scalar_first=True)
+        return RobotPose(position, attitude, float(np.interp(moment, times, self.tail_phase[pair])))
 
 
 def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
@@ -234,8 +221,9 @@ def _continued(attitude: Samples) -> Samples:
 
 def _roll_of(attitude: Samples) -> Samples:
     """Angle turned about the body's own axis, summed over the samples, rad."""
-    (w, x, y, z), (a, b, c, d) = attitude[:-1].T, attitude[1:].T
-    scalar = w * a + x * b + y * c + z * d
-    along = w * b - x * a - y * d + z * c  # x of the turn from one sample to the next, in the body's axes
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_quat(attitude, scalar_first=True)
+    scalar, along, *_ = (turns[:-1].inv() * turns[1:]).as_quat(scalar_first=True).T
     steps = 2.0 * np.arctan2(along, scalar)
     return np.concatenate([[0.0], np.cumsum((steps + np.pi) % (2.0 * np.pi) - np.pi)])

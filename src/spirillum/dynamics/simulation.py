@@ -11,13 +11,13 @@ import numpy as np
 
 from spirillum.dynamics.axial_robot import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
+from spirillum.dynamics.free_robot import two_links
 from spirillum.dynamics.integration import integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.release import (
     InTube,
     Release,
     check_not_resolved,
-    links_without_walls,
     reach_of,
     resting_state,
     turning_rate,
@@ -212,7 +212,7 @@ def _free_run(
     """A run with six degrees of freedom, without walls."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     _, time, switches, unused = times.timetable(2.0 * np.pi / turning_rate(steady), own)
-    links = in_tilted_field(links_without_walls(steady, release.roughness, weight=release.weight), field)
+    links = in_tilted_field(two_links(steady, release.roughness, weight=release.weight), field)
     start = resting_state(steady.robot, links, release.placement)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])

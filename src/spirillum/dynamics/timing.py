@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError, check_range
+from spirillum.errors import InputError
 from spirillum.formats.tables import read_series
 from spirillum.notes import Note
-from spirillum.robot.arguments import Options
-from spirillum.scalars import is_number, is_whole
+from spirillum.robot.arguments import Options, file_path, in_range, whole
+from spirillum.robot.fields import Time
 from spirillum.units import KINDS, parse_option
 
 DUTY_COLUMNS = ("time_s", "duty")  #: Columns of a duty file; each row holds until the next one.
@@ -80,57 +80,19 @@ def read_duty(path: str | Path) -> list[Switch]:
 
 TRIAL_DURATION = 20.0  #: Length of a run in a tube, and of a trial, where none is given, s.
 _LARGEST_SAMPLES = 1_000_000
-_MOST_A_TURN = 10_000
 _SHORTEST = 1e-6  # Shortest run, in turns.
 _ROUNDING = 1e-9  # Difference of two times that is rounding, over the distance of two samples.
 
 
-def stated_duration(turns: float, duration: str | float | None) -> float | None:
-    """Length of a run as far as it is known without a rate: s, or None where it is in turns."""
-    check_range("turns", turns, _SHORTEST, 1e5)
-    return None if duration is None else parse_option("duration", duration, KINDS["time"])
-
-
-def duration_of(turns: float, turn: float, duration: str | float | None) -> float:
+def duration_of(turns: float, turn: float, duration: float | None) -> float:
     """Length of a run, s."""
-    end = stated_duration(turns, duration)
-    if end is None:
+    if duration is None:
         return turns * turn
-    if end < _SHORTEST * turn:
-        raise InputError(f"duration = {end:g} s; allowed: at least {_SHORTEST * turn:.3g} s, a millionth of a turn")
-    return end
-
-
-def _whole(value: Any) -> Any:
-    if not is_whole(value):
-        raise InputError(f"samples-per-turn = {str(value)[:40]}; allowed: a whole number from 1 to {_MOST_A_TURN}")
-    check_range("samples-per-turn", int(value), 1, _MOST_A_TURN, " a turn")
-    return int(value)
-
-
-def _float(value: float) -> float:
-    """A number; infinity where it is too large for one, which the next check refuses."""
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
-def _of_kind(name: str, kinds: tuple[type, ...], allowed: str) -> BeforeValidator:
-    """A check that a value is a number where `float` is among its kinds, None where its type is, or of the others."""
-
-    def check(value: Any) -> Any:
-        if float in kinds and is_number(value):
-            return _float(value)
-        if not isinstance(value, tuple(kind for kind in kinds if kind is not float)):
-            raise InputError(f"{name} = {str(value)[:40]}; allowed: {allowed}")
-        return value
-
-    return BeforeValidator(check)
-
-
-_DUTY = "a duty file; one number is drive.duty of the robot"
-_NONE = type(None)
+    if duration < _SHORTEST * turn:
+        raise InputError(
+            f"duration = {duration:g} s; allowed: at least {_SHORTEST * turn:.3g} s, a millionth of a turn"
+        )
+    return duration
 
 
 class Timetable(NamedTuple):
@@ -147,25 +109,21 @@ class Timing(Options):
 
     argument: ClassVar[str] = "timing"
 
-    turns: Annotated[float, _of_kind("turns", (float,), "a number of turns")] = 3.0
+    turns: Annotated[float, BeforeValidator(in_range(_SHORTEST, 1e5))] = 3.0
     """Length of the run in turns of the tail, or of the field (the paper's three periods; free in a tube: 20 s)."""
-    duration: Annotated[
-        str | float | None, _of_kind("duration", (_NONE, str, float), "a time, as in 2 s, or a float in s")
-    ] = None
-    """Length of the run in time instead, with its unit (``"2 s"``) or a float in s."""
-    samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100  #: Samples of the output per turn.
+    duration: Time | None = None  #: Length of the run in time instead, with its unit (``"2 s"``) or a float in s.
+    samples_per_turn: Annotated[int, BeforeValidator(whole(1, 10_000))] = 100  #: Samples of the output per turn.
     on: Annotated[Sequence[Window] | None, BeforeValidator(windows_of)] = None
     """Times (start, stop) between which the remote switches the drive on, with unit (``"2 s"``) or floats in s; None:
     on throughout."""
-    duty: Annotated[str | Path | None, _of_kind("duty", (_NONE, str, Path), _DUTY)] = None
+    duty: Annotated[str | Path | None, file_path("a duty file; one number is drive.duty of the robot")] = None
     """Duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next."""
 
     def check(self) -> None:
         """Refuse what no run can have, before anything is known of the robot's own rate."""
-        end = stated_duration(self.turns, self.duration)
-        if end is not None and "turns" in self.model_fields_set:
+        if self.duration is not None and "turns" in self.model_fields_set:
             raise InputError(f"turns = {self.turns:g} together with a duration; allowed: one of them")
-        schedule(self.on, self.duty, 1.0, math.inf if end is None else end)
+        schedule(self.on, self.duty, 1.0, math.inf if self.duration is None else self.duration)
 
     def of_trial(self) -> Timing:
         """This timing with the length of a trial where none is given."""

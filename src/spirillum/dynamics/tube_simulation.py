@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,6 +25,7 @@ from spirillum.kernels.core import MOTIONS, largest_yaw, resistance_at
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.progress import Progress
+from spirillum.robot.fields import field_values
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
@@ -76,8 +77,9 @@ def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
     for what, (then, now) in pairs.items():
         if not _equal_values(then, now):
             return f"{what} {_as_text(then)}, and not {_as_text(now)}"
-    fields = _other_fields(robot_of(before).model_dump(), steady.robot.model_dump())
-    return f"another {fields[0]}" if fields else ""
+    old, own = ({item.path: item.value for item in field_values(robot)} for robot in (robot_of(before), steady.robot))
+    other = (path for path in own | old if not _equal_values(old.get(path), own.get(path)))
+    return next((f"another {path}" for path in other), "")
 
 
 def weight_words(links: TubeRobot) -> str:
@@ -107,18 +109,6 @@ def _equal_values(then: Any, now: Any) -> bool:
 
 def _as_text(value: str | float) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
-
-
-def _other_fields(then: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Dotted names of the fields in which two robots differ, but for rounding."""
-    found = []
-    for name, value in now.items():
-        old = then.get(name)
-        if isinstance(value, Mapping) and isinstance(old, Mapping):
-            found += _other_fields(old, value, f"{prefix}{name}.")
-        elif not _equal_values(old, value):
-            found.append(f"{prefix}{name}")
-    return found
 
 
 def _number(dataset: xr.Dataset, name: str) -> float:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError, clipped, did_you_mean
@@ -118,6 +119,17 @@ def one_of(*allowed: str) -> Callable[[Any], Any]:
         return value
 
     return check
+
+
+def file_path(what: str) -> BeforeValidator:
+    """A check of the path of a file that is described in these words, or None."""
+
+    def check(value: Any) -> Any:
+        if not (value is None or isinstance(value, (str, Path))):
+            raise refusal(f"= {str(value)[:40]}; allowed: {what}")
+        return value
+
+    return BeforeValidator(check)
 
 
 _DEEPEST = 24  # nesting of tables up to which fields are distinguished: no robot file has more
