@@ -57,7 +57,6 @@ def calibrate(
     """
     from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
-    from spirillum.cli import renderer
     from spirillum.robot.arguments import set_fields
     from spirillum.swimming.preparation import AUTO
     from spirillum.swimming.released_motion import RELEASED
@@ -74,18 +73,16 @@ def calibrate(
         refuse_conflicts(context, "no figures")
     if (method := typed.get("method", "posterior")) in METHODS and method != "posterior":
         refuse_conflicts(context, "no posterior", method=method)
-    with renderer.progress_bar(quiet=json) as progress:
-        found = request(
-            observations,
-            robots,
-            output,
-            friction=friction,
-            assume_uncertainty=_stated(assume_uncertainty or ()),
-            sampling=Sampling(**request.take("sampling")),
-            workers=min(os.cpu_count() or 1, 2),
-            progress=progress,
-        )
-    renderer.show(found.to_dict(), json=json)
+    found = request.show(
+        observations,
+        robots,
+        output,
+        friction=friction,
+        assume_uncertainty=_stated(assume_uncertainty or ()),
+        sampling=Sampling(**request.take("sampling")),
+        workers=min(os.cpu_count() or 1, 2),
+        json=json,
+    )
     if not found.converged:
         raise typer.Exit(1)
 

@@ -12,7 +12,7 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, Json, starting
+from spirillum.cli.shared_options import PANELS, Json, choices_in
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
@@ -22,26 +22,6 @@ if TYPE_CHECKING:
 _EYES = ("model", "tracker")
 
 
-def _complete_tasks(incomplete: str) -> list[str]:
-    from spirillum.controllers.control import TASKS
-
-    return starting(TASKS, incomplete)
-
-
-def _complete_controllers(incomplete: str) -> list[str]:
-    from spirillum.controllers.task import CONTROLLERS
-
-    return starting(CONTROLLERS, incomplete)
-
-
-def _complete_laws(incomplete: str) -> list[str]:
-    from typing import get_args
-
-    from spirillum.controllers.steering import Law
-
-    return starting(get_args(Law), incomplete)
-
-
 @from_function(
     "spirillum.controllers.control:control",
     without={
@@ -49,7 +29,10 @@ def _complete_laws(incomplete: str) -> list[str]:
         "bench": "--seen-by and --remote",
         **dict.fromkeys(("placement.yaw", "placement.tail_drop", "placement.flow"), "of simulate"),
     },
-    complete={"controller": _complete_controllers, "law": _complete_laws},
+    complete={
+        "controller": choices_in("spirillum.controllers.task:CONTROLLERS"),
+        "law": choices_in("spirillum.controllers.steering:Law"),
+    },
     tables={
         "task": (
             "spirillum.controllers.stop_task:StopAtTask",
@@ -66,7 +49,7 @@ def control(
     task: Annotated[
         str,
         typer.Option(
-            autocompletion=_complete_tasks,
+            autocompletion=choices_in("spirillum.controllers.control:TASKS"),
             help="What to do: stop-at, hold-speed, ride-out, save-battery, keep-axis.",
             rich_help_panel=PANELS["task."],
         ),
@@ -86,10 +69,10 @@ def control(
     Example: `spirillum control biorob2012-wide --task stop-at --at 5mm -o run.nc --plot run.png`
     """
     from spirillum.cli import renderer
-    from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
+    from spirillum.files import guard_inputs, netcdf_target, write_dataset
 
     target = None if output is None else netcdf_target(output)
-    picture = None if plot is None else output_target(plot, PICTURES, "run.png")
+    draw = renderer.picture(plot, "run.png", "spirillum.view.figures.control:control_figure")
     if movie is not None:
         check_movie(movie)
     lab = request.typed.pop("lab", None)
@@ -106,12 +89,8 @@ def control(
         if target is not None:
             write_dataset(found.dataset, target)
         with renderer.answer_before_error(lambda: renderer.with_files(found.to_dict(), **files), json=json):
-            if picture is not None:
-                from spirillum.view.figures.control import control_figure
-                from spirillum.view.figures.style import save_as
-
-                save_as(control_figure(found), picture)
-                files["plot"] = str(plot)
+            if plot is not None:
+                files["plot"] = draw(found)
             if movie is not None:
                 from spirillum.view.scene3d.film import film
 

@@ -151,6 +151,15 @@ class Request:
         first = () if self.source.robot is None else (self.robot,)  # a wrong robot is named before work begins
         return getattr(import_module(module), name)(*first, *more, **{**self.arguments, **others})
 
+    def show(self, *more: Any, json: bool, **others: Any) -> Any:
+        """Call the function with a progress bar, print its answer, and return it."""
+        from spirillum.cli import renderer
+
+        with renderer.progress_bar(quiet=json) as progress:
+            found = self(*more, progress=progress, **others)
+        renderer.show(found.to_dict(), json=json)
+        return found
+
 
 def from_function(
     target: str,

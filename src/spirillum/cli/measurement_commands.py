@@ -10,17 +10,15 @@ import typer
 
 from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
-from spirillum.cli.shared_options import (
-    Json,
-    NotedCommand,
-    Settings,
-    choices,
-    optional_robot,
-)
+from spirillum.cli.shared_options import Json, NotedCommand, Settings, choices, optional_robot
 from spirillum.cli.wrapping import wrapped
+from spirillum.errors import InputError
 
 if TYPE_CHECKING:
     from spirillum.live.observation import Observation, Tracked
+
+
+_NO_SETUP = "--setup is missing; allowed: a setup file, see `spirillum setup new`"
 
 
 @from_function(
@@ -48,10 +46,9 @@ def measure(
     Example: `spirillum measure trial-1.mp4 trial-2.mp4 --setup setup.toml -o measured`
     """
     from spirillum.cli import renderer
-    from spirillum.errors import InputError
 
     if setup is None:
-        raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
+        raise InputError(_NO_SETUP)
     overrides = overrides_from(settings)
     drawn = request.typed.get("figures", True)
     refuse_conflicts(context, "feasibility" if feasibility else "no feasibility", *([] if drawn else ["no figures"]))
@@ -68,9 +65,7 @@ def measure(
         return
     from spirillum.measurement.trials import RATE_NAMES
 
-    with renderer.progress_bar(quiet=json) as progress:
-        result = request(videos or [], setup, output, overrides=overrides, progress=progress)
-    renderer.show(result.to_dict(), json=json)
+    result = request.show(videos or [], setup, output, overrides=overrides, json=json)
     if result.failures:
         video, sentence = result.failures[0]
         more = "" if len(result.failures) == 1 else f" (and {len(result.failures) - 1} more)"
@@ -103,12 +98,11 @@ def track(
     Example: `spirillum track camera:0 --setup setup.toml --size 640x480 --fps 30`
     """
     from spirillum.cli import renderer
-    from spirillum.errors import InputError
     from spirillum.live.session import observation_line
     from spirillum.live.streams import line_of
 
     if setup is None:
-        raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
+        raise InputError(_NO_SETUP)
 
     def say(said: Observation, latency: float | None) -> None:
         typer.echo(line_of(observation_line(said, latency)))
@@ -127,7 +121,6 @@ def track(
 
 def _end(result: Tracked, source: str) -> None:
     """Leave with the exit code of how it ended."""
-    from spirillum.errors import InputError
     from spirillum.measurement.trials import RATE_NAMES
 
     if result.interrupted:
@@ -143,8 +136,6 @@ def _end(result: Tracked, source: str) -> None:
 
 
 def _size(word: str) -> tuple[int, int]:
-    from spirillum.errors import InputError
-
     parts = word.lower().split("x")
     if len(parts) != 2 or not all(part.isascii() and part.isdigit() and 1 <= len(part) <= 5 for part in parts):
         raise InputError(f"size = {word[:40]!r}; allowed: WIDTHxHEIGHT in pixels, for example 640x480")
@@ -170,12 +161,8 @@ def render(
 
     Example: `spirillum render biorob2012-wide -o trial.mp4 --tail-rate 1.2Hz --duration 20s`
     """
-    from spirillum.cli import renderer
-
     request.typed["degradation.preset"] = preset
-    with renderer.progress_bar(quiet=json) as progress:
-        found = request(output, troubles=None if trouble is None else ",".join(trouble), progress=progress)
-    renderer.show(found.to_dict(), json=json)
+    request.show(output, troubles=None if trouble is None else ",".join(trouble), json=json)
 
 
 @from_function(
@@ -198,12 +185,8 @@ def virtual_experiment(
 
     Example: `spirillum virtual-experiment -o experiment --tail-rate 1.2Hz`
     """
-    from spirillum.cli import renderer
-
     request.typed["degradation.preset"] = preset
-    with renderer.progress_bar(quiet=json) as progress:
-        found = request(study, output, progress=progress)
-    renderer.show(found.to_dict(), json=json)
+    request.show(study, output, json=json)
 
 
 setup_app = typer.Typer(name="setup", help="Setup files: camera, tank, ruler and robot.", no_args_is_help=True)
@@ -234,11 +217,7 @@ def propose(
 
     Example: `spirillum setup propose trial-1.mp4 my-robot.toml --spacing 2mm -o setup.toml`
     """
-    from spirillum.cli import renderer
-
-    with renderer.progress_bar(quiet=json) as progress:
-        found = request(film, robot, output, progress=progress)
-    renderer.show(found.to_dict(), json=json)
+    request.show(film, robot, output, json=json)
 
 
 @setup_app.command("check", cls=NotedCommand)

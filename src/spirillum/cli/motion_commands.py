@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import time_window
-from spirillum.cli.shared_options import (
-    NO_FORM,
-    NO_START,
-    Json,
-    complete_models,
-)
+from spirillum.cli.shared_options import NO_FORM, NO_START, Json, complete_models
+from spirillum.errors import InputError, check_choice
 from spirillum.notes import note_attributes, notes_in
 
 if TYPE_CHECKING:
@@ -55,7 +51,6 @@ def simulate(
     from spirillum.cli import renderer
     from spirillum.dynamics.integration import INTERRUPTED
     from spirillum.dynamics.run_summary import run_answer
-    from spirillum.errors import InputError, check_choice
     from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
 
     over_time = flow is not None and (flow.lower().endswith(".csv") or Path(flow).is_file())
@@ -127,8 +122,6 @@ def _draw_and_film(
 @contextmanager
 def _after_the_run(what: str, *, written: bool) -> Iterator[None]:
     """Report that something cannot be plotted, and whether the run itself is kept."""
-    from spirillum.errors import InputError
-
     try:
         yield
     except InputError as error:

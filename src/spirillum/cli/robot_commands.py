@@ -19,6 +19,7 @@ from spirillum.cli.shared_options import (
     starting,
 )
 from spirillum.cli.wrapping import wrapped
+from spirillum.errors import InputError
 
 robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
 
@@ -86,7 +87,6 @@ def prepare(
     Example: `spirillum prepare biorob2012-wide`
     """
     from spirillum.cli import renderer
-    from spirillum.errors import InputError
     from spirillum.papers.studies import study_of
     from spirillum.studies.study_loader import load_study
     from spirillum.swimming.preparation import preparations_answer, prepare_all
@@ -139,7 +139,6 @@ def export(
     Example: `spirillum export biorob2012-wide robot.stl`
     """
     from spirillum.cli import renderer
-    from spirillum.errors import InputError
 
     if target.suffix.lower() == ".mcap":
         from spirillum.exports.recording import export_run

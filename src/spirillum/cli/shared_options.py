@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from copy import copy
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 
@@ -44,25 +45,20 @@ def complete_robots(incomplete: str) -> list[str]:
     return complete_presets(incomplete) + [name for name in files if name.startswith(incomplete)]
 
 
-def complete_models(incomplete: str) -> list[str]:
-    """Names of models that make a robot swim."""
-    from spirillum.fluid.registry import SWIMMER_MODELS
+def choices_in(target: str, *first: str) -> Callable[[str], list[str]]:
+    """Completion of one of some words, or of those that a constant (`module:name`) has, which may be a literal type."""
 
-    return starting(sorted(SWIMMER_MODELS), incomplete)
+    def complete(incomplete: str) -> list[str]:
+        module, _, name = target.partition(":")
+        words = getattr(import_module(module), name)
+        return starting((*first, *sorted(get_args(words) or words)), incomplete)
 
-
-def complete_auto_models(incomplete: str) -> list[str]:
-    """Names of models that make a robot swim, and the word that leaves the choice open."""
-    return [*starting(("auto",), incomplete), *complete_models(incomplete)]
-
-
-def complete_resistance_models(incomplete: str) -> list[str]:
-    """Names of models that give a resistance matrix."""
-    from spirillum.fluid.registry import MODELS
-
-    return starting(sorted(MODELS), incomplete)
+    return complete
 
 
+complete_models = choices_in("spirillum.fluid.registry:SWIMMER_MODELS")
+complete_auto_models = choices_in("spirillum.fluid.registry:SWIMMER_MODELS", "auto")
+complete_resistance_models = choices_in("spirillum.fluid.registry:MODELS")
 complete_parts = choices("body", "both", "coupling", "robot", "rotor", "tail")
 COMPLETERS = {"ROBOTS": complete_robots, "PRESETS": complete_presets, "MODELS": complete_auto_models}
 """Completions that own options name in their table; others list their words."""

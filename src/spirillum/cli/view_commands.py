@@ -9,7 +9,7 @@ import typer
 
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import refuse_conflicts
-from spirillum.cli.shared_options import NO_FORM, Json, choices, optional_robot, starting
+from spirillum.cli.shared_options import NO_FORM, Json, choices, choices_in, optional_robot
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
@@ -76,12 +76,6 @@ def film(
     renderer.show(found.to_dict(), json=json)
 
 
-def _complete_models(incomplete: str) -> list[str]:
-    from spirillum.fields.flow import FLOW_MODELS
-
-    return starting(("auto", *FLOW_MODELS), incomplete)
-
-
 @from_function(
     "spirillum.fields.flow:flow",
     without={
@@ -89,7 +83,7 @@ def _complete_models(incomplete: str) -> list[str]:
         "resolution.phases": "an option of the robot, model.tube.phases",
         "calibrated": "factors represent walls that are not in the flow",
     },
-    complete={"model": _complete_models, "frame": choices("body", "lab")},
+    complete={"model": choices_in("spirillum.fields.flow:FLOW_MODELS", "auto"), "frame": choices("body", "lab")},
     robot=optional_robot("A preset's name or a TOML file; none with --run."),
 )
 def flow(
