@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from spirillum.papers.validation import CaseResult, ValidationRow
 from spirillum.view.figures.sheet import Picture, Sheet
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, plain
+from spirillum.view.figures.style import COLOURS, PATCH, plain
 
 _COLOURS = ("blue", "vermillion", "green", "purple", "orange", "sky", "black")
 _MARKERS = "osD^vPX*"
@@ -53,9 +53,8 @@ def _drawn(result: CaseResult) -> Figure:
     sheet = Sheet(
         plain(f"{result.name}: {result.case.title}", 110),
         plain(f"Published numbers read: {result.case.read}. Nothing is fitted.", 110),
-        width=PAGE,
         heights=[height for height, _ in panels],
-        columns=1,
+        letters=False,
         sharey=False,
         legend=[] if result.case.curve else list(_legend(result)),
     )

@@ -137,10 +137,10 @@ def _draw_taken(name: str, figures: Path, *, vector: bool) -> list[Path]:
 def load_figures() -> None:
     """Load what drawing takes, with the fonts and the parser of formulas: of a process that draws beside this one."""
     from spirillum.view.figures.sheet import Sheet
-    from spirillum.view.figures.style import PAGE, styled
+    from spirillum.view.figures.style import styled
 
     with styled():
-        Sheet("$x$", "", width=PAGE, heights=[1.0], columns=1).finished()
+        Sheet("$x$", "", heights=[1.0]).finished()
 
 
 def data_uri(picture: bytes, kind: str) -> str:

@@ -13,7 +13,7 @@ from spirillum.arrays import Values
 from spirillum.display import label_of_model
 from spirillum.papers.biorob2012.evidence import GLOBAL_DROP, LARGEST_REYNOLDS, Evidence
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
-from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
+from spirillum.view.figures.sheet import Picture, Sheet, width_of
 from spirillum.view.figures.study import PANEL
 from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
 from spirillum.view.figures.style import UnitPrefix, look_of_model
@@ -74,7 +74,6 @@ def _draw(shown: StudyView, evidence: Evidence, notes: list[str]) -> Figure:
         legend=legend,
     )
     panels = sheet.panels[0]
-    add_letters(panels)
     values = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = UnitPrefix.of(values, "m")
     for axes, wavelength in zip(panels, wavelengths, strict=True):

@@ -18,7 +18,7 @@ from spirillum.calibration.least_squares import FEWEST_LEFT
 from spirillum.display import label_of_model, percent
 from spirillum.units import Hz
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
-from spirillum.view.figures.sheet import Sheet, add_letters, width_of
+from spirillum.view.figures.sheet import Sheet, width_of
 from spirillum.view.figures.study_panels import spread
 from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, in_words, look_of_model, plain, styled
 
@@ -53,9 +53,9 @@ def posterior_figure(found: Calibrated) -> Figure:
         sheet = Sheet(
             "Posterior of the fitted numbers",
             words,
-            width=PAGE,
             heights=[min((PAGE - _MARGIN) / count, 2.0) - 0.1] * count,
             columns=count,
+            letters=False,
             sharey=False,
         )
         for row, below in enumerate(names):
@@ -171,7 +171,6 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
             ],
         )
         every = list(sheet.panels.flat)
-        add_letters(every)
         scales = _scales(found, {profile.label: profile.values for profile in profiles})
         for axes, profile in zip(every, profiles, strict=False):
             scale = scales[profile.label]
@@ -281,7 +280,6 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             notes=notes,
             legend=handles,
         )
-        add_letters(sheet.panels.flat)
         for row, axes_row in zip(rows, sheet.panels, strict=True):
             for amplitude, axes in zip(columns, axes_row, strict=True):
                 here = inside & np.array([abs(r.tail.amplitude - amplitude) < 1e-9 for r in experiment.robots])
@@ -384,13 +382,10 @@ def residual_figure(found: Calibrated) -> Figure:
         sheet = Sheet(
             "Residuals of the fitted model",
             _source(found),
-            width=PAGE,
             heights=[1.5] * len(names),
-            columns=1,
             notes=[_fit_words(found), "Tails in each channel by wavelength, then amplitude."],
             legend=handles,
         )
-        add_letters(sheet.panels.flat)
         tails = [robot.tail for robot in experiment.robots]
         order = sorted(
             range(experiment.size), key=lambda n: (experiment.channel[n], tails[n].wavelength, tails[n].amplitude)

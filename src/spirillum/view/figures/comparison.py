@@ -22,7 +22,7 @@ from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import WALLED
 from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Picture, Sheet, add_letters
+from spirillum.view.figures.sheet import Picture, Sheet
 from spirillum.view.figures.style import (
     COLOURS,
     PAGE,
@@ -158,13 +158,11 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
         sheet = Sheet(
             f"{plain(comparison.robot.name, 60)}: models side by side",
             f"{driven} · friction model '{comparison.friction}' · computed, no measured data",
-            width=PAGE,
             heights=[_LINE_HEIGHT * len(comparison.models) + 0.1] * 2,
             columns=2,
             notes=_notes(comparison),
         )
         panels = sheet.panels.ravel()
-        add_letters(panels)
         for axes, panel in zip(panels, _PANELS, strict=True):
             _draw(axes, comparison, panel)
         # A star where a result contains calibration factors.
@@ -262,9 +260,8 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         sheet = Sheet(
             f"{plain(comparison.robot.name, 60)}: why models differ",
             f"friction model '{comparison.friction}' · computed, no measured data",
-            width=PAGE,
             heights=[_EFFECT_HEIGHT * len(effects) + 0.1],
-            columns=1,
+            letters=False,
             notes=[
                 "Each line keeps the effects above it; factor: speed over that of the line above.",
                 _TRIAL if effects[-1].name == RELEASED_EFFECT else _why_no_trial(comparison),

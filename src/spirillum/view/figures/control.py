@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from spirillum.arrays import Samples
 from spirillum.controllers.control import Control
 from spirillum.units import show
-from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import COLOURS, PATCH, UnitPrefix, plain, styled
 
 _MOST_SEEN = 1500  # largest number of plotted frames
 
@@ -30,15 +30,12 @@ def control_figure(control: Control) -> Figure:
             f"model {control.model} · camera {show(control.lab.camera.latency, 's')} late · remote "
             f"{show(control.lab.remote.delay, 's')} late · friction times {control.drawn.friction:.3g} · {flow} · "
             f"{'good' if control.score.good else 'not good'} enough · computed, no measured data",
-            width=PAGE,
             heights=[1.9, 1.5, 0.8],
-            columns=1,
             sharex="col",
             sharey=False,
             legend=_legend(control),
         )
         panels = sheet.panels[:, 0]
-        add_letters(panels)
         time = control.dataset["time"].values
         target, around = control.task.target(time, float(np.sign(control.speed)))
         scale = UnitPrefix.of(_path_of(control).true, "m")

@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.designs.design_result import Design, ObjectiveProfile
 from spirillum.designs.evaluation import Objective
 from spirillum.units import display_unit, in_unit
-from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.sheet import Sheet
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, PATCH, UnitPrefix, plain, styled
 
 _REFUSED = "#dddddd"
@@ -46,6 +46,7 @@ def design_figure(design: Design) -> Figure:
             width=COLUMN if columns == 1 else PAGE,
             heights=[2.0] * -(-count // columns),
             columns=columns,
+            letters=count > 1,
             sharey=False,
             legend=_legend(design),
         )
@@ -53,8 +54,6 @@ def design_figure(design: Design) -> Figure:
         for spare in panels[count:]:
             spare.set_visible(False)
         panels = panels[:count]
-        if count > 1:
-            add_letters(panels)
         rest = list(panels)
         if design.front is not None:
             _front(rest.pop(0), design)

@@ -101,11 +101,9 @@ def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
         _draw_pressure(panels[1], view)
         if strip:
             _draw_strip(sheet.panels[-1, -1], view)
-            add_letters([*panels, sheet.panels[-1, -1]])
-        else:
-            add_letters(panels)
         if strip and not stacked:
             sheet.panels[1, 0].remove()
+            add_letters([*panels, sheet.panels[1, 1]])
         figure = sheet.finished(shape=float(np.ptp(view.y) / np.ptp(view.x)))
         for axes in panels:
             axes.set_aspect("equal")

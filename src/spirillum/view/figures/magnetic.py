@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 
 from spirillum.arrays import Samples
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import COLOURS, PATCH, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,6 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
             f"{plain(dataset.attrs['robot'])} in a rotating field",
             f"model {dataset.attrs['model']} · free in unbounded fluid, without weight · field sped up step by step · "
             "computed, no measured data",
-            width=PAGE,
             heights=[1.9, 1.9],
             columns=2,
             sharex=True,
@@ -44,7 +43,6 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
             ],
         )
         panels = sheet.panels.ravel()
-        add_letters(panels)
         fine, turning, lag = _constrained_response(dataset)
         advance = float(dataset["held_forward_velocity"][0] / dataset["held_tail_rotation_rate"][0])
         panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from spirillum.swimming.prediction import Prediction
 from spirillum.view.figures.sheet import Sheet
-from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
+from spirillum.view.figures.style import COLOURS, UnitPrefix, plain, styled
 
 _SPEED = "forward_velocity"
 _ROW = 0.34  # height of a row, inches
@@ -35,9 +35,8 @@ def prediction_figure(prediction: Prediction) -> Figure:
         sheet = Sheet(
             f"{plain(prediction.robot.name, 60)}: predicted speed",
             f"model {prediction.model.name} · friction model '{prediction.friction}' · computed, no measured data",
-            width=PAGE,
             heights=[_ROW * len(rows) + 0.1],
-            columns=1,
+            letters=False,
             notes=[*_bars(prediction), *missing],
         )
         axes = sheet.panels[0, 0]

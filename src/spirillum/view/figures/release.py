@@ -16,8 +16,8 @@ from spirillum.dynamics.settling import Settling
 from spirillum.quantities import unit_of
 from spirillum.studies.ranking import StudyRanking, robot_dims
 from spirillum.units import Hz, show_height
-from spirillum.view.figures.sheet import Picture, Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
+from spirillum.view.figures.sheet import Picture, Sheet
+from spirillum.view.figures.style import COLOURS, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,6 @@ def settling_figure(settling: Settling) -> Figure:
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
             f"roughness {show_height(settling.roughness)} · friction {settling.friction_coefficient:.3g} · "
             "computed, no measured data",
-            width=PAGE,
             heights=[1.9],
             columns=3,
             sharey=False,
@@ -44,7 +43,6 @@ def settling_figure(settling: Settling) -> Figure:
             notes=_notes(settling),
         )
         panels = sheet.panels[0]
-        add_letters(panels)
         time, lengths = settling.way("time"), UnitPrefix.of(settling.way("gap"), "m")
         lines = ({"gap": "blue"}, {"azimuth": "vermillion"}, _TILTS)
         labels = (f"gap under the body ({lengths.unit})", "azimuth on the wall (deg)", "tilt against the wall (deg)")
@@ -126,7 +124,7 @@ def _drawn(dataset: xr.Dataset, robots: dict[str, int], title: str, caption: str
         for label, colour, marker in _KINDS
     ]
     heights = [0.28 * len(_SHOWN)] * len(robots)
-    sheet = Sheet(title, caption, width=PAGE, heights=heights, columns=1, legend=legend, sharex="all", sharey=False)
+    sheet = Sheet(title, caption, heights=heights, legend=legend, sharex="all", sharey=False)
     panels = sheet.panels[:, 0]
     touching = _readings(dataset, "contact_share") > 0
     for axes, (robot, place) in zip(panels, robots.items(), strict=True):
@@ -140,7 +138,6 @@ def _drawn(dataset: xr.Dataset, robots: dict[str, int], title: str, caption: str
         axes.set_ylim(len(_SHOWN) - 0.4, -0.6)
         axes.set_title(plain(robot, 60), loc="center", pad=3)
     panels[-1].set_xlabel("size over the robot's median")
-    add_letters(panels)
     return sheet.finished()
 
 

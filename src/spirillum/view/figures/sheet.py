@@ -55,7 +55,7 @@ def add_letters(panels: Iterable[Axes]) -> None:
 
 
 class Sheet:
-    """A figure with a grid of panels of given height below title, subtitle and legend, notes at the foot.
+    """A figure with a grid of lettered panels of given height below title, subtitle and legend, notes at the foot.
 
     Widths and heights are in inches; a formula in a note must not contain a space.
     """
@@ -65,9 +65,10 @@ class Sheet:
         title: str,
         subtitle: str,
         *,
-        width: float,
         heights: Sequence[float],
-        columns: int,
+        width: float = PAGE,
+        columns: int = 1,
+        letters: bool = True,
         notes: Sequence[str] = (),
         legend: Sequence[Line2D] = (),
         legend_below: Sequence[Line2D] = (),
@@ -99,6 +100,8 @@ class Sheet:
             # Ticks are made when they are drawn, which a caller may do outside `styled`.
             axes.tick_params(length=2.5, width=0.6, labelsize=8, colors="#333333")
             axes.tick_params(grid_color="#dddddd", grid_linewidth=0.5)
+        if letters:
+            add_letters(self.panels.flat)
 
     def finished(self, shape: float | None = None, *, alike: bool = False) -> Figure:
         """Fix the layout: as high as the panels need; where columns are alike, that of the first gives the others'."""

@@ -22,7 +22,7 @@ from spirillum.view.figures.rows import (
     robot_rows,
     settled_handles,
 )
-from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
+from spirillum.view.figures.sheet import Picture, Sheet, width_of
 from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
 from spirillum.view.figures.style import UnitPrefix, distinct_labels, plain
 
@@ -143,7 +143,6 @@ def _draw_channel(
         legend=model_handles(shown, own_drive=not shown.observed),
         legend_below=amplitude_handles(shown) if rows[-1].across == "rates" else (),
     )
-    add_letters(sheet.panels.flat)
     scale = UnitPrefix.of(np.asarray(shown.whole["amplitude"].values, dtype=float), "m")
     for number, row in enumerate(rows):
         labelled = number == len(rows) - 1 or rows[number + 1].across != row.across
@@ -247,10 +246,8 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
         width=width_of(len(wavelengths), PANEL[0]),
         heights=[PANEL[1]] * len(channels),
         columns=len(wavelengths),
-        notes=(),
         legend=legend,
     )
-    add_letters(sheet.panels.flat)
     amplitudes = spread(shown.whole.sizes["amplitude"], MOST_TAILS)
     values = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = UnitPrefix.of(values, "m")
@@ -322,11 +319,9 @@ def _draw_robots(
         shown.source_line,
         width=width_of(1, width),
         heights=[1.6] * len(rows),
-        columns=1,
         notes=notes,
         legend=legend,
     )
-    add_letters(sheet.panels.flat)
     x = np.asarray(indices, dtype=float)
     for number, (row, axes) in enumerate(zip(rows, sheet.panels.flat, strict=True)):
         row.draw(axes, shown.part(robot=indices), x)

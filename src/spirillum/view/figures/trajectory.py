@@ -22,7 +22,7 @@ from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
 from spirillum.units import show, show_height, speed_unit
 from spirillum.view.figures.run_panels import draw_cross_section, event_words, events_of, mark_events
-from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.sheet import Sheet
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
@@ -122,7 +122,6 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double", panels: str =
                 axes.set_xlabel("time (s)")
         for axes in over_time[1:]:
             axes.sharex(over_time[0])
-        add_letters(every[:drawn])
         return sheet.finished()
 
 
