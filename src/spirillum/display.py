@@ -127,12 +127,9 @@ def text_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str
 
 def _lines(rows: Sequence[QuantityRow], indent: str) -> list[str]:
     width = max((len(row.name) for row in rows), default=0)
-    return [f"{indent}{row.name:<{width}}  {_with_ends(row)}" for row in rows]
-
-
-def _with_ends(row: QuantityRow) -> str:
-    ends = f" ({row.low} to {row.high})" if row.low and row.low != row.high else ""
-    return f"{row.value} {row.unit}".rstrip() + ends
+    ends = [f" ({row.low} to {row.high})" if row.low and row.low != row.high else "" for row in rows]
+    sizes = [f"{row.value} {row.unit}".rstrip() + end for row, end in zip(rows, ends, strict=True)]
+    return [f"{indent}{row.name:<{width}}  {size}" for row, size in zip(rows, sizes, strict=True)]
 
 
 def html_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:

@@ -169,17 +169,9 @@ def from_function(
     robot: Any = RobotArgument,
     tables: Mapping[str, Sequence[str]] | None = None,
 ) -> Callable[[Callable[..., None]], Any]:
-    """Decorator that gives a command the arguments of a public function as options.
-
-    The command takes the `Request` and its own options, which replace those of the same name.
-
-    Args:
-        target: the function, `module:name`.
-        without: arguments and fields that are no option of the command, with the reason.
-        complete: what the shell completes by argument, where it is not as in other commands.
-        robot: annotation of the argument that names the robot; None for a function without one.
-        tables: arguments that are mappings, with the functions or classes that declare their fields.
-    """
+    """Decorator that gives a command the arguments of a public function (`module:name`) as options."""
+    # The command takes the `Request` and its own options, which replace those of the same name. The arguments are the
+    # fields of `FunctionSource`; `complete` is what the shell completes where it is not as in other commands.
 
     def decorate(body: Callable[..., None]) -> Callable[[], None]:
         def stub() -> None: ...
@@ -312,20 +304,24 @@ def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any
         metavar = _BY_UNIT[unit[1]]
     about: dict[str, Any] = {"help": _help(item, metavar), "rich_help_panel": PANELS.get(item.table or item.path)}
     about |= {"autocompletion": completions.get(last)}
-    if "bool" in words:
-        return _switch(item, option, about)
+    if item.is_switch:
+        name = f"--no-{option[2:]}" if item.default and item.path not in NAMES else option
+        return Annotated[bool, typer.Option(name, **about)], False
+    if "bool" in words:  # the function decides by default
+        return Annotated[bool | None, typer.Option(f"{option}/--no-{option[2:]}", show_default=False, **about)], None
     default = item.default if item.default != () and metavar is None and "." not in item.path else None
     kind, metavar = _value_kind(item, metavar)
+    as_typed = "x".join(map(str, item.default)) if isinstance(item.default, tuple) else str(item.default)
     if kind == list[str]:
         about["help"] = f"{str(about['help']).rstrip('.')}; repeatable."
     if default is None:
         kind |= None
     elif isinstance(default, tuple):
-        default = _default_as_typed(default)
+        default = as_typed
     if unit is not None and metavar is not None and item.default:
         default = f"{item.default:g}{unit[1]}"
     if "." in item.path and metavar is None and item.default not in (None, ()):
-        about["show_default"] = _default_as_typed(item.default)
+        about["show_default"] = as_typed
     return Annotated[kind, typer.Option(option, metavar=METAVARS.get(item.path, metavar), **about)], default
 
 
@@ -339,19 +335,6 @@ def _value_kind(item: Declaration, metavar: str | None) -> tuple[Any, str | None
     if metavar is None and "tuple" not in words and words & {"int", "float"}:
         return int if "int" in words else float, metavar
     return str, metavar
-
-
-def _default_as_typed(value: Any) -> str:
-    """A default as it is typed."""
-    return "x".join(map(str, value)) if isinstance(value, tuple) else str(value)
-
-
-def _switch(item: Declaration, option: str, about: dict[str, Any]) -> tuple[Any, Any]:
-    """A switch; one of three states where the function decides by default."""
-    if item.is_switch:
-        name = f"--no-{option[2:]}" if item.default and item.path not in NAMES else option
-        return Annotated[bool, typer.Option(name, **about)], False
-    return Annotated[bool | None, typer.Option(f"{option}/--no-{option[2:]}", show_default=False, **about)], None
 
 
 def _help(item: Declaration, metavar: str | None) -> str:

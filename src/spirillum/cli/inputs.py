@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
-from functools import partial
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -26,41 +25,25 @@ class Rule(NamedTuple):
     """Rest of the sentence after the options: the conflict, and what is allowed; the request fills words in braces."""
 
 
-def _rules() -> dict[str, list[Rule]]:
-    """The rows of `rules.csv`."""
-    found: dict[str, list[Rule]] = {}
-    for row in rows_of("cli/rules.csv"):
-        rule = Rule(row["state"], tuple(row["options"].split()), row["conflict"])
-        found.setdefault(row["command"], []).append(rule)
-    return found
-
-
-RULES = _rules()  #: Rules by command, in the order in which they are checked.
-
-
-def check_rules(command: str, states: Collection[str], given: Callable[..., list[str]], **words: object) -> None:
-    """Refuse options that conflict with the request."""
-    for rule in RULES[command]:
-        if rule.state in states and (found := given(*rule.options)):
-            raise InputError(f"{', '.join(found)} {rule.conflict.format(**words)}")
-
-
-_V = TypeVar("_V")
-
-
-def typed_options(context: typer.Context, *parameters: str) -> list[str]:
-    """Options that were typed, in the order of `parameters`, also those with the value that they have otherwise."""
-    options = {parameter.name: max(parameter.opts, key=len) for parameter in context.command.params}
-    return [
-        options[name]
-        for name in parameters
-        if (source := context.get_parameter_source(name)) is not None and source.name != "DEFAULT"
-    ]
+RULES: dict[str, list[Rule]] = {}  #: The rows of `rules.csv` by command, in the order in which they are checked.
+for _row in rows_of("cli/rules.csv"):
+    _rule = Rule(_row["state"], tuple(_row["options"].split()), _row["conflict"])
+    RULES.setdefault(_row["command"], []).append(_rule)
 
 
 def refuse_conflicts(context: typer.Context, *states: str, **words: object) -> None:
     """Refuse typed options that conflict with the request, by the rules of the command."""
-    check_rules(str(context.info_name), states, partial(typed_options, context), **words)
+    # Also those that were typed with the value that they have otherwise.
+    options = {parameter.name: max(parameter.opts, key=len) for parameter in context.command.params}
+    sources = {name: context.get_parameter_source(str(name)) for name in options}
+    typed = {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
+    for rule in RULES[str(context.info_name)]:
+        found = [options[name] for name in rule.options if name in typed]
+        if rule.state in states and found:
+            raise InputError(f"{', '.join(found)} {rule.conflict.format(**words)}")
+
+
+_V = TypeVar("_V")
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:

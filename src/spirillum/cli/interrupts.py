@@ -24,14 +24,10 @@ _NUMBER = re.compile(r"[\d.+-]+")  # also in digits of other scripts
 
 
 class InterruptibleCommand(TyperCommand):
-    """A command whose sentence on an interrupt says what is kept, where what was interrupted does not.
-
-    It refuses an option that is given twice, an empty name of a file, and a number in other digits than 0 to 9, by the
-    option's name.
-    """
+    """A command whose sentence on an interrupt says what is kept, where what was interrupted does not."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return the arguments that no parameter takes."""
+        """Return the arguments that no parameter takes; refuse options given twice, empty names and foreign digits."""
         takes = {name: one for one in self.params if not getattr(one, "is_flag", True) for name in one.opts}
         split = [part for text in args for part in (text.split("=", 1) if text.startswith("--") else [text])]
         given = [takes[name] for name in split if name in takes]

@@ -35,12 +35,12 @@ class _PipedConsole(Console):
 
 
 def show(answer: Answer, *, json: bool, **options: Any) -> None:
-    """Print an answer as JSON, or as title, cautions, tables and the number of its notes, which `--notes` prints.
-
-    Its blocks come from the function of `spirillum.cli.tables` that is named after the answer's schema.
-    """
+    """Print an answer as JSON, or as title, cautions, tables and the number of its notes, which `--notes` prints."""
     if json:
-        _print_json(answer)
+        try:
+            typer.echo(as_json(answer))
+        except BrokenPipeError as error:
+            raise BrokenPipeError from error  # without its number, by which the library would end with exit code 1
         return
     console = _PipedConsole(emoji=False)
     if console.width < NARROWEST:
@@ -66,13 +66,6 @@ def _left_line(notes: Sequence[Note], shown: Sequence[Note]) -> str:
     others = dict.fromkeys(note.code for note in notes if note.severity == "caution" and note.code not in above)
     also = f"{counted(len(others), 'more caution')} ({', '.join(others)}) and " if others else ""
     return f"{also}notes: --notes"
-
-
-def _print_json(answer: Answer) -> None:
-    try:
-        typer.echo(as_json(answer))
-    except BrokenPipeError as error:
-        raise BrokenPipeError from error  # without its number, by which the library would end with exit code 1
 
 
 def _print(console: Console, block: Block, style: str = "") -> None:

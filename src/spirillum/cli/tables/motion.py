@@ -231,17 +231,13 @@ def simulation(answer: Answer) -> Blocks:
         details = [f"{name.replace('_', ' ')} {words}" for name, words in shown.items()]
         yield Detail(f"in the tube: ends {pose['ends']}, {', '.join(details)}")
     if "state" in answer:
-        yield Detail(_end_state(answer))
+        state = answer["state"]
+        yield Detail(f"state at the end: {state} ({END_STATES[state]}); {ASSUMPTION}")
     yield from error_of(answer["error_estimate"])
     whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
     yield Detail(f"last 2/3 of run: over the last two thirds of {whole}, on or off")
     yield Detail(f"steady part: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
-
-
-def _end_state(answer: Answer) -> str:
-    """The state in which a released robot ends, what it means, and what it rests on."""
-    return f"state at the end: {answer['state']} ({END_STATES[answer['state']]}); {ASSUMPTION}"
 
 
 def _averages(title: str, answer: Answer) -> Table:

@@ -100,20 +100,17 @@ def released_columns(answer: Answer) -> Iterator[Block]:
         wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
         yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
         yield from _over_unknowns(answer["trial"])
-        yield from (Detail(f"no {names} of a trial: {reason}") for names, reason in _without_value(answer["trial"]))
+        items = [(name, one) for name, one in answer["trial"].items() if isinstance(one, Mapping)]
+        lacking = {name: one["reason"] for name, one in items if "reason" in one}
+        for reason in dict.fromkeys(lacking.values()):
+            names = ", ".join(name.replace("_", " ") for name in lacking if lacking[name] == reason)
+            yield Detail(f"no {names} of a trial: {reason}")
     if "steady" in there and "steady" not in missing:
         from spirillum.swimming.released_motion import END_STATES  # brings the models
 
         constant = answer["steady"]["time_constant"]["value"]  # it hangs on where the approach is looked at
         after = f", approached with a time constant of {constant:.2g} s" if constant else ""
         yield f"steady: {END_STATES[answer['steady']['state']]}{after}; {answer['steady']['assumption']}"
-
-
-def _without_value(motion: Answer) -> Iterator[tuple[str, str]]:
-    """Quantities that a motion does not have, by the reason that they share."""
-    reasons = {name: item["reason"] for name, item in motion.items() if isinstance(item, Mapping) and "reason" in item}
-    for reason in dict.fromkeys(reasons.values()):
-        yield ", ".join(name.replace("_", " ") for name in reasons if reasons[name] == reason), reason
 
 
 def _over_unknowns(trial: Answer) -> Iterator[str]:
@@ -162,7 +159,8 @@ def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]
     details = [str(placement["kind"])]
     for name, item in placement.items():
         if isinstance(item, Mapping) and item.get("value") is not None:
-            details.append(f"{name.replace('_', ' ')} {in_words(item)}" + _band_words(item))
+            band = f" (open: band over {range_words(item)})" if "low" in item else ""
+            details.append(f"{name.replace('_', ' ')} {in_words(item)}{band}")
         elif name != "kind" and isinstance(item, str):
             details.append(f"{name.replace('_', ' ')} {item}")
     yield Detail(f"{head}: {', '.join(details)}")
@@ -206,11 +204,6 @@ def _range_words(item: Mapping[str, Any]) -> str:
     if item.get("kind") != "range" or item["low"] is None:
         return ""
     return f" (mean over {item['over']}, at least {' '.join(friendly(item['low'], item['unit']))})"
-
-
-def _band_words(item: Mapping[str, Any]) -> str:
-    """Over what a field of the placement is left open."""
-    return f" (open: band over {range_words(item)})" if "low" in item else ""
 
 
 def range_words(item: Mapping[str, Any]) -> str:
