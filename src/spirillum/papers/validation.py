@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -176,11 +176,7 @@ class CaseResult:
             "source": self.case.source,
             "read": self.case.read,
             "kind": self.case.kind,
-            "ratios": [
-                {"quantity": one.quantity, "mean": one.mean, "deviation": one.deviation}
-                | {"count": one.count, "covered": one.covered}
-                for one in self.summaries
-            ],
+            "ratios": [asdict(one) for one in self.summaries],
             "assumptions": [{"name": one.name, "values": one.values} for one in self.case.assumptions],
             "statements": [
                 {**claim.to_dict(), "read": read} for claim, read in zip(self.statements, self.read, strict=True)

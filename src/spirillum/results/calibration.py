@@ -21,9 +21,8 @@ from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inp
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.formats.templates import rendered
 from spirillum.notes import Note
-from spirillum.optional_dependencies import import_optional
 from spirillum.progress import Progress, tell
-from spirillum.results.page import Drawings, draw_together, load_figures
+from spirillum.results.page import draw_together, load_figures
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
 from spirillum.swimming.preparation import AUTO
@@ -184,7 +183,8 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             check_folder(folder)
         drawn, draws = figures and folder is not None, method == "posterior"
         shared = workers != 1 and (drawn or draws)
-        beside = stack.enter_context(process_beside(partial(_load, drawn, draws))) if shared else None
+        needed = [*(["emcee"] if draws else []), *(["spirillum.view.figures.calibration"] if drawn else [])]
+        beside = stack.enter_context(process_beside(partial(load_figures, *needed))) if shared else None
         found = fit_model(
             observations,
             robots,
@@ -232,7 +232,18 @@ def write_calibration(
         if path not in written:
             path.unlink(missing_ok=True)
     if figures:
-        written += _drawn(found, folder, progress, vector=vector, beside=beside)
+        from spirillum.view.figures.calibration import calibration_drawings
+
+        drawings = calibration_drawings(found)
+        drawn = draw_together(
+            drawings,
+            output_folder(folder / "figures", folder),
+            lambda name, done: tell(progress, f"figure {name}", done, len(drawings)),
+            vector=vector,
+            again=partial(calibration_drawings, found),
+            beside=beside,
+        )
+        written += [path for paths in drawn.values() for path in paths]
     files = sorted(str(path.relative_to(folder)) for path in written)
     gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
     said = [Note("files", f"{folder} held an earlier calibration: its {gone} are gone")] if gone else []
@@ -245,42 +256,6 @@ def _gone(paths: Sequence[Path]) -> str:
     names = [str(path) for path in paths if len(path.parts) == 1]
     names += [f"{pictures} figure{'s' if pictures > 1 else ''}"] if pictures else []
     return " and ".join(names)
-
-
-def _drawn(
-    found: Calibrated,
-    folder: Path,
-    progress: Progress | None,
-    *,
-    vector: bool,
-    beside: ProcessPoolExecutor | None,
-) -> list[Path]:
-    drawings = _drawings(found)
-    written = draw_together(
-        drawings,
-        output_folder(folder / "figures", folder),
-        lambda name, done: tell(progress, f"figure {name}", done, len(drawings)),
-        vector=vector,
-        again=partial(_drawings, found),
-        beside=beside,
-    )
-    return [path for paths in written.values() for path in paths]
-
-
-def _drawings(found: Calibrated) -> Drawings:
-    from spirillum.view.figures.calibration import calibration_drawings
-
-    return calibration_drawings(found)
-
-
-def _load(drawn: bool, draws: bool) -> None:  # noqa: FBT001 - called by the pool
-    """Import what the sampler and the figures take, in a process beside this one."""
-    if draws:
-        import_optional("emcee", "method 'posterior'", "posterior")
-    if drawn:
-        import spirillum.view.figures.calibration  # noqa: F401
-
-        load_figures()
 
 
 def predictions_text(found: Calibrated) -> str:

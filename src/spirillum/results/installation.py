@@ -6,7 +6,7 @@ import os
 import platform
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Any
 
@@ -32,15 +32,8 @@ class InstallationReport(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The report as data, as ``report --json`` prints it."""
-        content = {
-            "spirillum": self.spirillum,
-            "python": self.python,
-            "platform": self.platform,
-            "processors": self.processors,
-            "packages": dict(self.packages),
-            "missing": {extra: list(names) for extra, names in self.missing.items()},
-        }
-        return envelope("report", content, ())
+        missing = {extra: list(names) for extra, names in self.missing.items()}
+        return envelope("report", {**asdict(self), "missing": missing}, ())
 
     def __str__(self) -> str:
         """The report as lines to paste."""

@@ -234,7 +234,7 @@ def _measured(asked: MeasurementRequest, folder: _Folder | None, on_progress: Pr
     for number, path in enumerate(asked.videos):
         words = path.name if count == 1 else f"{path.name} ({number + 1} of {count})"
         try:
-            trials.append(_trial(asked, number, folder, _frames_told(on_progress, words)))
+            trials.append(_trial(asked, number, folder, partial(_tell_frames, on_progress, words)))
         except (KeyboardInterrupt, OSError) as error:
             with suppress(OSError):  # as far as there is room for it
                 if trials:
@@ -252,8 +252,8 @@ def _measured(asked: MeasurementRequest, folder: _Folder | None, on_progress: Pr
     return _finished(asked, trials, failures, folder, on_progress, interrupted=False)
 
 
-def _frames_told(on_progress: Progress, words: str) -> Callable[[int, int | None], None]:
-    return lambda done, frames: on_progress(words, done, max(done, frames or 0))
+def _tell_frames(on_progress: Progress, words: str, done: int, frames: int | None) -> None:
+    on_progress(words, done, max(done, frames or 0))
 
 
 def _trial(
@@ -277,10 +277,7 @@ def _annotated_trial(
     asked: MeasurementRequest, number: int, folder: _Folder, on_progress: Callable[[int, int | None], None]
 ) -> Trial:
     path, name = asked.videos[number], asked.names[number]
-
-    def thumbnail(picture: bytes) -> None:
-        folder.thumbnails[name] = picture
-
+    thumbnail = partial(folder.thumbnails.__setitem__, name)
     target = folder.path / f"{name}.{_FILM}"
     video = opened(path, asked.setup)
     words = {"title": f"{path.name}, annotated"}

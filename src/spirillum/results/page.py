@@ -8,6 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -47,17 +48,8 @@ def draw_pictures(
     again: Callable[[], Mapping[str, Picture]] | None = None,
     beside: ProcessPoolExecutor | None = None,
 ) -> list[EmbeddedPicture]:
-    """Write `figures/`, PNG and with `vector` also SVG, each file whole or not at all.
-
-    Args:
-        pictures: pictures by the names of their files.
-        folder: folder of the report.
-        on_progress: called with the name of a picture and the number of those before it.
-        vector: write SVG too.
-        largest_svg: size up to which an SVG is embedded, bytes.
-        again: a function that a process can take, which returns the same pictures.
-        beside: a process that draws every second picture with it.
-    """
+    """Write `figures/` of a report, PNG and with `vector` also SVG; embed an SVG of at most `largest_svg` bytes."""
+    # `again` is a function that a process can take, which returns the same pictures; the one `beside` draws with it.
     figures = output_folder(folder / "figures", folder)
     drawings = {name: picture.figure for name, picture in pictures.items()}
     shared = None if again is None else partial(_drawings_of, again)
@@ -87,10 +79,9 @@ def draw_together(
     again: Callable[[], Drawings] | None = None,
     beside: ProcessPoolExecutor | None = None,
 ) -> dict[str, list[Path]]:
-    """Write figures by name into a folder, every second one in the process beside this one; return their files.
+    """Write figures by name into a folder, every second one in the process beside this one; return their files."""
+    from spirillum.view.figures.style import save, save_drawn
 
-    `again` returns the same figures in that process.
-    """
     with TemporaryDirectory() as elsewhere:  # this process alone writes into the folder: the other one may be ended
         theirs: dict[str, Future[list[Path]]] = {}
         if beside is not None and again is not None:
@@ -102,25 +93,13 @@ def draw_together(
         for name in (*(name for name in drawings if name not in theirs), *reversed(theirs)):
             if name not in theirs or theirs[name].cancel():  # of those that the other process has not begun
                 on_progress(name, len(written))
-                written[name] = _drawn(drawings[name], figures / name, vector=vector)
+                written[name] = save(drawings[name](), figures / name, vector=vector)
         for name in drawings.keys() - written.keys():
             if theirs[name].exception() is None:
-                written[name] = _taken_over(theirs[name].result(), figures)
+                written[name] = save_drawn(theirs[name].result(), figures)
             else:
-                written[name] = _drawn(drawings[name], figures / name, vector=vector)
+                written[name] = save(drawings[name](), figures / name, vector=vector)
     return {name: written[name] for name in drawings}
-
-
-def _drawn(draw: Callable[[], Figure], path: Path, *, vector: bool) -> list[Path]:
-    from spirillum.view.figures.style import save
-
-    return save(draw(), path, vector=vector)
-
-
-def _taken_over(files: list[Path], figures: Path) -> list[Path]:
-    from spirillum.view.figures.style import save_drawn
-
-    return save_drawn(files, figures)
 
 
 _TAKEN: dict[str, Callable[[], Figure]] = {}  # Figures of a process that draws beside another one.
@@ -131,11 +110,15 @@ def _take_drawings(again: Callable[[], Drawings]) -> None:
 
 
 def _draw_taken(name: str, figures: Path, *, vector: bool) -> list[Path]:
-    return _drawn(_TAKEN[name], figures / name, vector=vector)
+    from spirillum.view.figures.style import save
+
+    return save(_TAKEN[name](), figures / name, vector=vector)
 
 
-def load_figures() -> None:
-    """Load what drawing takes, with the fonts and the parser of formulas: of a process that draws beside this one."""
+def load_figures(*modules: str) -> None:
+    """Load modules, and fonts and the parser of formulas, in a process that draws beside this one."""
+    for module in modules:
+        import_module(module)
     from spirillum.view.figures.sheet import Sheet
     from spirillum.view.figures.style import styled
 

@@ -7,11 +7,12 @@ import io
 import json
 import math
 import shutil
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import xarray as xr
@@ -21,12 +22,14 @@ from spirillum.errors import InputError
 from spirillum.files import check_replaceable, guard_inputs, output_folder, results_folder, write_dataset, write_text
 from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
+from spirillum.papers.claim import PredictedVerdict, Verdict
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
 from spirillum.progress import Progress
 from spirillum.results.page import draw_pictures, load_figures
 from spirillum.results.study_content import content, ranking_content
 from spirillum.results.study_store import stored_study
+from spirillum.robot.fields import Section
 from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import Drive, Motor
@@ -60,27 +63,19 @@ def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
         table["tail"] = {**table["tail"], **own}
     else:
         table = dumps[place]
-    robot = _rebuilt(table)
+    # The settings were checked when the study was loaded.
+    parts: dict[str, Any] = {
+        name: kind.model_construct(**table[name]) if table.get(name) else None for name, kind in _PARTS.items()
+    }
+    robot = Robot.model_construct(name=str(table["name"]), **parts)
     words = robot_words(robot)
     first = f"the first of the ranking: {ranking.robots[0].name}" if ranking.robots else "the study's first robot"
     return Picture("The robot", f"{words} Drawn is {first}.", words, lambda: robot_figure(robot))
 
 
-def _rebuilt(table: Mapping[str, Any]) -> Robot:
-    """A robot from its SI settings, which were checked when the study was loaded."""
-    channel, drive, motor = table.get("channel"), table.get("drive"), table.get("motor")
-    return Robot.model_construct(
-        name=str(table["name"]),
-        body=Body.model_construct(**table["body"]),
-        coupling=Coupling.model_construct(**table["coupling"]),
-        tail=Tail.model_construct(**table["tail"]),
-        fluid=Fluid.model_construct(**table["fluid"]),
-        channel=Channel.model_construct(**channel) if channel else None,
-        drive=Drive.model_construct(**drive) if drive else None,
-        motor=Motor.model_construct(**motor) if motor else None,
-    )
-
-
+_PARTS: dict[str, type[Section]] = {"body": Body, "coupling": Coupling, "tail": Tail, "fluid": Fluid}
+_PARTS |= {"channel": Channel, "drive": Drive, "motor": Motor}
+"""Tables of a robot of which its picture is made."""
 _LARGEST_SVG = 2_000_000  # a larger vector picture is embedded as pixels, bytes
 
 
@@ -255,7 +250,7 @@ def study(  # noqa: PLR0913 - the options of the command
                 check_replaceable(folder / name, begins=begin.encode())
         make_tables(loaded, pool, on_progress)
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
-        with process_beside(_load) if figures and workers != 1 else nullcontext() as beside:
+        with process_beside(partial(load_figures, *_DRAWING)) if figures and workers != 1 else nullcontext() as beside:
             if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
                 parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
                 dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
@@ -268,27 +263,16 @@ def study(  # noqa: PLR0913 - the options of the command
     return StudyDataset.of(dataset)
 
 
-def _load() -> None:
-    """Import what drawing takes, in a process that draws beside this one."""
-    import spirillum.papers.biorob2012.figures
-    import spirillum.view.figures.comparison
-    import spirillum.view.figures.release
-    import spirillum.view.figures.robot  # noqa: F401
-
-    load_figures()
+_DRAWING = (
+    *("spirillum.papers.biorob2012.figures", "spirillum.view.figures.comparison"),
+    *("spirillum.view.figures.release", "spirillum.view.figures.robot"),
+)
+"""Modules that draw the figures of a study."""
 
 
 def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
     """What a study has found and written, as `spirillum study` prints it."""
-    claims = claims_of(dataset)
-    verdicts = {
-        verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")
-    }
-    predictions = predictions_of(dataset)
-    third = {
-        verdict: sum(c.verdict == verdict for c in predictions)
-        for verdict in ("predicted-agrees", "predicted-disagrees", "depends")
-    }
+    claims, predictions = (Counter(claim.verdict for claim in found(dataset)) for found in (claims_of, predictions_of))
     content = {
         "title": dataset.attrs["title"],
         "folder": str(output),
@@ -298,8 +282,8 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "ranking": ranking_of(dataset).to_dict(),
         "results": dataset["outside"].size,
         "unanswered": int(np.count_nonzero(dataset["outside"].values)),
-        "claims": verdicts,
-        **({"predictions": third} if predictions else {}),
+        "claims": {verdict: claims[verdict] for verdict in get_args(Verdict)},
+        **({"predictions": {name: predictions[name] for name in get_args(PredictedVerdict)}} if predictions else {}),
         "observations": dataset.attrs["observations"],
     }
     return envelope("study", content, notes_in(dataset.attrs))

@@ -210,7 +210,9 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         rows = [shown["header"], *shown["rows"]]
         widths = [max(len(row[column]) for row in rows) for column in range(len(shown["header"]))]
         lines = [f"{self.attrs.get('title', 'Study')}: {shown['message']}", f"  {shown['basis']}"]
-        lines += [_line(row, widths) for row in rows]
+        for row in rows:
+            cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            lines.append(f"  {'  '.join(cells)}".rstrip())
         lines += [f"  and {shown['more']} more"] if shown["more"] else []
         sizes = ", ".join(f"{name} {size}" for name, size in self.sizes.items())
         dataset = f"dataset: {len(self.data_vars)} variables over {sizes}; list(study), study.info()"
@@ -231,8 +233,3 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
 
     def _warnings(self) -> Iterator[str]:
         return (f"{note.severity}: {note}" for note in notes_in(self.attrs))
-
-
-def _line(row: list[str], widths: list[int]) -> str:
-    cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-    return f"  {'  '.join(cells)}".rstrip()

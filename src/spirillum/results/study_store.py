@@ -72,7 +72,11 @@ def stored_study(
             estimate = estimate_of(loaded, observed, plan, len(missing), pool) if is_large(loaded) else None
             _write_regions(_Work(loaded, observed, plan, folder), missing, pool, on_progress, estimate)
         if outcome is None:
-            outcome = _summed(loaded, [_note_of(folder / plan.note(region)) for region in plan.layout.regions()])
+            kept = [_note_of(folder / plan.note(region)) for region in plan.layout.regions()]
+            warnings = warnings_of(loaded)
+            warnings += summed((caution for note in kept for caution in note.cautions), loaded.count)
+            notes = note_attributes(dict.fromkeys(warnings + warnings_of_calibrations(loaded)))
+            outcome = _Outcome(**notes, unanswered=sum(note.unanswered for note in kept))
         _write_headers(plan, folder, {**attributes, **outcome._asdict(), "finished": "yes"})
         shutil.rmtree(folder / _NOTES, ignore_errors=True)
         return opened_store(folder)
@@ -187,13 +191,6 @@ def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:
     while gcd(step, len(regions)) > 1:
         step += 1
     return [regions[(len(regions) // 2 + number * step) % len(regions)] for number in range(len(regions))]
-
-
-def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
-    warnings = warnings_of(loaded)
-    warnings += summed((caution for note in notes for caution in note.cautions), loaded.count)
-    warnings += warnings_of_calibrations(loaded)
-    return _Outcome(**note_attributes(dict.fromkeys(warnings)), unanswered=sum(note.unanswered for note in notes))
 
 
 def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:

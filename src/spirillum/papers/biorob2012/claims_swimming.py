@@ -18,7 +18,6 @@ from spirillum.papers.biorob2012.evidence import (
     Evidence,
     claim_of,
     fraction_between,
-    in_hertz,
 )
 from spirillum.papers.biorob2012.published import VELOCITY_DROPS
 from spirillum.papers.claim import Claim, Verdict
@@ -53,7 +52,7 @@ def reynolds_numbers(evidence: Evidence) -> Iterator[Claim]:
         needed, bounds = [], []
         for model in evidence.models:
             advance = evidence.free("advance_per_radian", model, channel)[tail]
-            needed.append(f"{label(model)} {in_hertz(speed / advance)}")
+            needed.append(f"{label(model)} {speed / advance / Hz:.3g} Hz")
             bound = evidence.free("reynolds_number", model, channel)[tail]
             bounds.append(f"{label(model)} {bound / reynolds:.1f}")
         yield claim_of(
@@ -80,7 +79,7 @@ def _observed_reynolds(evidence: Evidence, channel: str, tail: tuple[int, int]) 
     reynolds = LARGEST_REYNOLDS[channel].value
     speeds = evidence.observation("forward_velocity", channel)
     found = speeds[tail] / evidence.speed_of(1.0)
-    fastest = _place(speeds, int(np.nanargmax(speeds))) == tail
+    fastest = int(np.nanargmax(speeds)) == np.ravel_multi_index(tail, speeds.shape)
     close = abs(found / reynolds - 1.0) < 0.05
     seen = f"{np.count_nonzero(np.isfinite(speeds))} of {speeds.size}"
     holds = close and fastest
@@ -103,7 +102,7 @@ def velocity_drops(evidence: Evidence) -> Iterator[Claim]:
             wide, narrow = (evidence.observation("forward_velocity", channel) for channel in ("wide", "narrow"))
             drops = wide - narrow
             extreme = np.argmin(drops) if which == "lowest" else np.argmax(drops)
-            there = _place(drops, int(extreme)) == tail
+            there = int(extreme) == np.ravel_multi_index(tail, drops.shape)
             found = 1e3 * float(drops[tail])
             words = f"observed {found:.3f} mm/s; {'the' if there else 'not the'} {which} of all tails"
             verdict: Verdict = "agrees" if there and abs(found / drop - 1.0) < 0.05 else "disagrees"
@@ -209,11 +208,6 @@ def trends(evidence: Evidence) -> Iterator[Claim]:
         _always(np.concatenate([steps.ravel() for steps in rising])),
         "torque per rate does not depend on the rate",
     )
-
-
-def _place(values: Values, flat: int) -> tuple[int, int]:
-    row, column = divmod(flat, values.shape[1])
-    return row, column
 
 
 def _share(steps: Values) -> str:

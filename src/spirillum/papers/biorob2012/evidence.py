@@ -26,7 +26,7 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.studies.columns import reference_pose
 from spirillum.studies.released_robots import READ, WINDOWS, levels_of_readings, main_effects
-from spirillum.units import Hz, show_height
+from spirillum.units import show_height
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -157,11 +157,6 @@ class Evidence:
 def fraction_between(values: Values) -> str:
     """A range of fractions in per cent."""
     return f"{100 * np.nanmin(values):.1f} to {100 * np.nanmax(values):.1f} %"
-
-
-def in_hertz(rate: float) -> str:
-    """A rate in Hz."""
-    return f"{rate / Hz:.3g} Hz"
 
 
 _CLOSE = 0.05  # relative difference from a stated number within which it is met, as for observations
