@@ -221,7 +221,7 @@ def study(  # noqa: PLR0913 - the options of the command
     loaded = load_study(
         study_of(source),
         overrides,
-        models=models,
+        models=None if models is None else list(models),
         band=band,
         predicted=predicted,
         settled=settled,

@@ -14,8 +14,6 @@ import numpy as np
 
 from spirillum.arrays import Values
 from spirillum.dynamics.prediction import predict
-from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.notes import Note
@@ -23,7 +21,6 @@ from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
@@ -169,14 +166,11 @@ class HeldTask(OneRobot):
     needed = frozenset(MOVING)
     followed = f"held, model {WALLED}"
 
-    def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
-        """Compute every quantity, (1,); NaN for a robot outside the model's domain."""
-        robot = calibrated_robot(self.robot, CalibrationFile.model_construct(friction=loaded.friction))
-        try:
-            found = predict(robot, model=WALLED, motion="held", band=False, placement=self.placement)
-        except InputError:
-            return {name: np.full(1, np.nan) for name in MOVING}
-        return {name: np.array([float(getattr(found, name))]) for name in MOVING}
+    def follow(self, loaded: LoadedStudy, /) -> dict[str, float]:
+        """Compute the quantities of a robot within the model's domain."""
+        robot = loaded.with_friction(self.robot)
+        found = predict(robot, model=WALLED, motion="held", band=False, placement=self.placement)
+        return {name: float(getattr(found, name)) for name in MOVING}
 
 
 @dataclass(frozen=True)
@@ -198,29 +192,23 @@ class TrialTask(OneRobot):
         ends = {f"{name}_{end}" for name in MOVING for end in ENDS} if self.interval else set()
         return {*MOVING, *POSE, "state", *ends}
 
-    def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
-        """Compute every quantity, (1,); NaN for a robot without a trial."""
-        part: Part = {name: np.full(1, np.nan) for name in self.needed}
-        part["state"] = np.zeros(1)
+    def follow(self, _loaded: LoadedStudy, /) -> dict[str, float]:
+        """Compute the quantities of the trial; none without one."""
         stated = self.contact.model_fields_set  # the others are unknowns of the interval
         contact = {name: getattr(self.contact, name) for name in stated}
         roughness = contact.pop("roughness", None)
-        try:
-            held = predict(
-                self.robot, model=WALLED, band=False, placement=self.placement, roughness=roughness, in_tube=contact,
-                interval=self.interval,
-            )  # fmt: skip
-        except InputError:
-            return part
-        trial = held.trial
+        trial = predict(
+            self.robot, model=WALLED, band=False, placement=self.placement, roughness=roughness, in_tube=contact,
+            interval=self.interval,
+        ).trial  # fmt: skip
         if trial is None or trial.reason:
-            return part
-        part["state"] = np.array([float(TRIAL_STATES.index(trial.basis["state"]))])
-        part |= {name: np.array([trial.values.get(name, np.nan)]) for name in (*MOVING, *POSE)}
+            return {}
+        found = {"state": float(TRIAL_STATES.index(trial.basis["state"]))}
+        found |= {name: trial.values.get(name, np.nan) for name in (*MOVING, *POSE)}
         for name, over in trial.intervals.items():
             if name in MOVING:
-                part |= {f"{name}_{end}": np.array([getattr(over, end)]) for end in ENDS}
-        return part
+                found |= {f"{name}_{end}": getattr(over, end) for end in ENDS}
+        return found
 
 
 def axial_tasks(loaded: LoadedStudy) -> Iterator[HeldTask]:
@@ -230,20 +218,7 @@ def axial_tasks(loaded: LoadedStudy) -> Iterator[HeldTask]:
     for index in range(loaded.count):
         robot = loaded.robot_at(index)
         if robot.channel is not None and has_table(RobotBatch.of(robot)):
-            yield HeldTask(np.array([index]), robot, _placement(loaded, index))
-
-
-def trial_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[TrialTask]:
-    """One task for each of the robots; none where no trials are requested."""
-    study = loaded.study
-    for index, robot in robots.items() if study.trial else ():
-        placement = _placement(loaded, index)
-        yield TrialTask(np.array([index]), robot, placement, study.contact, interval=study.interval)
-
-
-def _placement(loaded: LoadedStudy, index: int) -> Placement:
-    """Where the robot at an index in the flat order of the study is held, or released."""
-    return loaded.placement_of(index // (loaded.count // len(loaded.robots)))
+            yield HeldTask(np.array([index]), robot, loaded.placement_at(index))
 
 
 def trial_notes(answers: Sequence[tuple[TrialTask, Part]]) -> list[Note]:

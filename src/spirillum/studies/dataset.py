@@ -229,15 +229,15 @@ def coordinates_of(loaded: LoadedStudy) -> dict[str, Any]:
     study, robots, source = loaded.study, loaded.robots, "input of the study"
     channel = [robot.channel.diameter if robot.channel else np.inf for robot in robots]
     first = "channel" if study.grid else "robot"
+
+    def labels(words: Sequence[str], meaning: str) -> tuple[Any, ...]:
+        return np.array(words, dtype=str), {"units": "1", "long_name": meaning, "source": source}
+
     coordinates: dict[str, Any] = {
-        first: (first, _text(loaded.names), {"units": "1", "long_name": f"name of the {first}", "source": source}),
+        first: (first, *labels(loaded.names, f"name of the {first}")),
         "channel_diameter": (first, channel, attributes("channel_diameter")),
-        "model": ("model", _text(study.models), {"units": "1", "long_name": "hydrodynamic model", "source": source}),
-        "friction": (
-            "friction",
-            _text(study.friction),
-            {"units": "1", "long_name": "reading of the effective friction", "source": source},
-        ),
+        "model": ("model", *labels(study.models, "hydrodynamic model")),
+        "friction": ("friction", *labels(study.friction, "reading of the effective friction")),
     }
     tail = {
         "wavelength": study.grid.wavelengths if study.grid else [r.tail.wavelength for r in robots],
@@ -249,10 +249,6 @@ def coordinates_of(loaded: LoadedStudy) -> dict[str, Any]:
         rates, name = list(study.assumed_motor_rates), "assumed_motor_rate"
         coordinates[name] = (name, rates, attributes(name))
     return coordinates
-
-
-def _text(names: Sequence[str]) -> Values:
-    return np.array(list(names), dtype=str)
 
 
 def _attributes_of(name: str) -> dict[str, Any]:

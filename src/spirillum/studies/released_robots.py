@@ -16,7 +16,7 @@ For the steady state, each robot is released at the study's placement, with its 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
@@ -217,12 +217,6 @@ def inferred(robot: Robot, seen: Part) -> Part:
     return {name: np.stack(values, axis=-1).reshape(*shape, len(INFERRED_BY)) for name, values in columns.items()}
 
 
-def release_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[ReleaseTask]:
-    """One task for each robot; none where none is requested."""
-    for index, robot in robots.items() if loaded.study.predicted else ():
-        yield ReleaseTask(np.array([index]), robot, loaded.study.laid_down)
-
-
 def without_answer(parts: Iterable[Part]) -> list[Note]:
     """A sentence on the runs after release without a result; none where all have one."""
     found = [np.isfinite(part["forward_velocity"]).any(axis=-1) for part in parts]
@@ -247,35 +241,23 @@ class SettledTask(OneRobot):
     needed = frozenset({*SETTLED, *POSE, "error_estimate", "near", "state"})
     followed = "steady state"
 
-    def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
-        """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
-        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *POSE, "error_estimate", "near")}
-        try:
-            motion = free_motion(
-                self.robot,
-                placement=self.placement,
-                roughness=self.contact.roughness,
-                in_tube={"friction_coefficient": self.contact.friction_coefficient},
-            )
-        except InputError:
-            return {**nothing, "state": np.zeros(1)}
+    def follow(self, _loaded: LoadedStudy, /) -> dict[str, float]:
+        """Compute the quantities of the steady motion; the state alone where there is none."""
+        motion = free_motion(
+            self.robot,
+            placement=self.placement,
+            roughness=self.contact.roughness,
+            in_tube={"friction_coefficient": self.contact.friction_coefficient},
+        )
         found = motion.prediction
         lying = found.lying
         assert lying is not None  # noqa: S101 - a free motion has one
-        state = np.array([float(SETTLED_STATES.index(lying.state))])
+        values = {"state": float(SETTLED_STATES.index(lying.state))}
         if lying.state == "changing":  # its means depend on when they are taken
-            return {**nothing, "state": state}
-        values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
+            return values
+        values |= {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
         values |= {name: float(getattr(lying, name)) for name in POSE}
-        values |= {"error_estimate": found.error_estimate, "near": float(motion.checked.near)}
-        return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
-
-
-def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[SettledTask]:
-    """One task for each robot; none where none is requested."""
-    tails = loaded.count // len(loaded.robots)
-    for index, robot in robots.items() if loaded.study.settled else ():
-        yield SettledTask(np.array([index]), robot, loaded.placement_of(index // tails), loaded.study.contact)
+        return values | {"error_estimate": found.error_estimate, "near": float(motion.checked.near)}
 
 
 def settled_basis(contact: Contact) -> Note:
@@ -289,18 +271,12 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
     lost = [task for task, part in answers if not np.isfinite(part["forward_velocity"][0])]
     far = [task for task, part in answers if task not in lost and np.isnan(part["error_estimate"][0])]
     near = [task for task, part in answers if part["near"][0] == 1.0 and task not in far]
-    found = []
-    if far:
-        found.append(Note.named("yaw-not-checked", count=len(far), robots=len(answers), first=far[0].robot.with_tail))
-    if near:
-        found.append(
-            Note.named(
-                "gap-not-checked", count=len(near), robots=len(answers), below=BELOW, first=near[0].robot.with_tail
-            )
-        )
-    if lost:
-        found.append(Note.named("not-settled", count=len(lost), robots=len(answers), first=lost[0].robot.with_tail))
-    return found
+    groups = {"yaw-not-checked": far, "gap-not-checked": near, "not-settled": lost}
+    return [
+        Note.named(name, count=len(group), robots=len(answers), below=BELOW, first=group[0].robot.with_tail)
+        for name, group in groups.items()
+        if group
+    ]
 
 
 def settled_variables(

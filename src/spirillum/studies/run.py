@@ -34,16 +34,13 @@ from spirillum.studies.columns import (
     band_tasks,
     missing_pose_notes,
     trial_notes,
-    trial_tasks,
 )
 from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, labelled_answers, summed
 from spirillum.studies.released_robots import (
     ReleaseTask,
     SettledTask,
     not_settled,
-    release_tasks,
     settled_basis,
-    settled_tasks,
     without_answer,
 )
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
@@ -145,10 +142,8 @@ def computed_study(
     requested: list[StudyTask] = [
         *tasks(loaded),
         *band_tasks(loaded),
-        *release_tasks(loaded, with_table),
-        *settled_tasks(loaded, with_table),
         *axial_tasks(loaded),
-        *trial_tasks(loaded, with_table),
+        *_followed_tasks(loaded, with_table),
     ]
     readings = len(loaded.study.friction)
     found = [stored_answer(number, task, parts, task.leading(readings)) for number, task in enumerate(requested)]
@@ -194,6 +189,19 @@ def computed_study(
     dataset.attrs = described(loaded, observed, fingerprint, list(dict.fromkeys(warnings)))
     dataset.attrs["checksum"] = checksum_of(dataset)
     return dataset
+
+
+def _followed_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot]) -> Iterator[StudyTask]:
+    """The tasks of robots that are followed in their tubes after release, as far as the study requests them."""
+    study = loaded.study
+    for index, robot in robots.items():
+        at, placement = np.array([index]), loaded.placement_at(index)
+        if study.predicted:
+            yield ReleaseTask(at, robot, study.laid_down)
+        if study.settled:
+            yield SettledTask(at, robot, placement, study.contact)
+        if study.trial:
+            yield TrialTask(at, robot, placement, study.contact, interval=study.interval)
 
 
 _KEPT = "; what was answered is kept"
@@ -275,12 +283,11 @@ def make_tables(loaded: LoadedStudy, pool: WorkerPool, progress: Progress) -> No
 
 def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[Note]:
     """A sentence on the robots that are not followed in their tubes for want of a table; none where all are."""
-    tails = loaded.count // len(loaded.robots)
     found: dict[str, list[Robot]] = {}
     for index in range(loaded.count):
         if index not in with_table:
             robot = loaded.robot_at(index)
-            why = _why_without_table(robot, loaded.placement_of(index // tails))
+            why = _why_without_table(robot, loaded.placement_at(index))
             found.setdefault(why, []).append(robot)
     return [
         Note(

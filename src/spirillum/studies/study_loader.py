@@ -15,11 +15,10 @@ import numpy as np
 from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
 from spirillum.files import read_toml
-from spirillum.fitted.calibration_file import FittedFriction
+from spirillum.fitted.calibration_file import CalibrationFile, FittedFriction, calibrated_robot
 from spirillum.fitted.fit import NO_FIT, Fit, check_not_overridden, read_fit
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.measurement.observations import (
-    ObservationRow,
     RobotObservations,
     check_driven,
     read_observations,
@@ -55,6 +54,14 @@ class LoadedStudy:
     def placement_of(self, number: int) -> Placement:
         """Pose of one of `robots`."""
         return self.placements[number] if self.placements else self.study.placement
+
+    def placement_at(self, index: int) -> Placement:
+        """Pose of the robot at an index in the flat order of the study."""
+        return self.placement_of(index // (self.count // len(self.robots)))
+
+    def with_friction(self, robot: Robot) -> Robot:
+        """Return a robot with the B_eff that was fitted to its tail, if any was."""
+        return calibrated_robot(robot, CalibrationFile.model_construct(friction=self.friction))
 
     @property
     def makes_tables(self) -> bool:
@@ -101,25 +108,12 @@ def load_study(
     source: str | Path | Mapping[str, Any],
     overrides: Mapping[str, Any] | None = None,
     *,
-    models: Sequence[str] | None = None,
-    band: bool | None = None,
-    predicted: bool | None = None,
-    settled: bool | None = None,
-    trial: bool | None = None,
-    interval: bool | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     largest: int = LARGEST_STUDY,
+    **instead: Any,
 ) -> LoadedStudy:
-    """Load a study and its robots; arguments as of `spirillum.study`, None: what the study states."""
-    instead = {
-        "models": None if models is None else list(models),
-        "band": band,
-        "predicted": predicted,
-        "settled": settled,
-        "trial": True if interval and trial is None else trial,
-        "interval": interval,
-    }
+    """Load a study and its robots; `instead` of what it states: `models`, `band`, ... as of `spirillum.study`."""
     study, name, folder = _read(source, {field: value for field, value in instead.items() if value is not None})
     if study.size > largest:
         store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
@@ -132,15 +126,12 @@ def load_study(
         _check_different(robots, entries, name)
     robots = _named_apart(robots, [varied for _, varied in entries])
     _check_drives(study, [entry for entry, _ in entries], robots, name)
-    for option in ("predicted", "settled", "trial"):
-        if getattr(study, option) and not (calibration is None and posterior is None):
-            raise InputError(
-                f"{name}: {option} together with a calibration or posterior; allowed: one of them, for these motions "
-                "are followed with nothing fitted"
-            )
-    fit = _fit(study, calibration, posterior)
-    given = (*set_fields(overrides or {}), *study.vary)
-    robots = tuple(_fitted_robot(robot, fit, given, str(posterior or calibration)) for robot in robots)
+    fit = _fit(study, calibration, posterior, name)
+    set_or_varied = (*set_fields(overrides or {}), *study.vary)
+    fitted = tuple(fit.central(robot) for robot in robots)
+    for robot, found in zip(robots, fitted, strict=True):
+        check_not_overridden(set_or_varied, robot, found, str(posterior or calibration))
+    robots = fitted
     _check_varied(study, overrides or {}, name)
     study, reason = _with_models(study, robots, fit, name)
     try:
@@ -170,7 +161,8 @@ def _read(source: str | Path | Mapping[str, Any], instead: Mapping[str, Any]) ->
         table, name = dict(source), "the study"
     else:
         table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
-    study = problems_in(Study, {**table, **instead})
+    implied = {"trial": True} if instead.get("interval") else {}
+    study = problems_in(Study, {**table, **implied, **instead})
     if isinstance(study, list):
         raise refused_table(study, name)
     return study, name, folder
@@ -250,7 +242,13 @@ def _flat(fields: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any
             yield f"{above}{name}", value
 
 
-def _fit(study: Study, calibration: str | Path | None, posterior: str | Path | None) -> Fit:
+def _fit(study: Study, calibration: str | Path | None, posterior: str | Path | None, name: str) -> Fit:
+    for option in ("predicted", "settled", "trial"):
+        if getattr(study, option) and not (calibration is None and posterior is None):
+            raise InputError(
+                f"{name}: {option} together with a calibration or posterior; allowed: one of them, for these motions "
+                "are followed with nothing fitted"
+            )
     if calibration is not None and posterior is not None:
         raise InputError("posterior together with a calibration; allowed: one of them")
     fit = read_fit(calibration, posterior, *(() if AUTO in study.models else study.models))
@@ -314,13 +312,6 @@ def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> 
     chosen = choose_model(AUTO, robots[0], fit=fit) if own else ModelChoice(WALLED, IN_CHANNEL)
     models = dict.fromkeys(chosen.model if model == AUTO else model for model in study.models)
     return study.model_copy(update={"models": tuple(models)}), chosen.reason
-
-
-def _fitted_robot(robot: Robot, fit: Fit, kept: Sequence[str], source: str) -> Robot:
-    """Return the robot with fitted values, which may not replace what was set."""
-    found = fit.central(robot)
-    check_not_overridden(kept, robot, found, source)
-    return found
 
 
 def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot], name: str) -> None:
@@ -387,8 +378,8 @@ def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:
                 f"wavelength {item.wavelength * 1e3:g} mm and amplitude {item.amplitude * 1e3:g} mm; "
                 "allowed: tails of the study"
             )
-    for robot, items in _by_robot(observations, tails):
-        check_driven(path, items, robot)
+    for robot in {id(tails[item.tail]): tails[item.tail] for item in observations}.values():
+        check_driven(path, [item for item in observations if tails[item.tail] is robot], robot)
     means = summarised(observations)
     rows = [means.get(tail) for tail in tails]
     columns = {name: _column(rows, name, 0) for name in _NAMES}
@@ -417,16 +408,6 @@ def _tails(loaded: LoadedStudy) -> dict[tuple[float, float, float], Robot]:
             "distinguish them; allowed: robots that differ in one of them"
         )
     return found
-
-
-def _by_robot(
-    observations: Sequence[ObservationRow], tails: Mapping[tuple[float, float, float], Robot]
-) -> list[tuple[Robot, list[ObservationRow]]]:
-    found: dict[int, tuple[Robot, list[ObservationRow]]] = {}
-    for item in observations:
-        robot = tails[item.tail]
-        found.setdefault(id(robot), (robot, []))[1].append(item)
-    return list(found.values())
 
 
 def _column(rows: Sequence[RobotObservations | None], name: str, item: int) -> PerRobot:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence, Set
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Any, ClassVar, NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.arrays import PerRobot, Values
 from spirillum.data_tables import rows_of
 from spirillum.display import counted
-from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
+from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
@@ -215,10 +215,17 @@ class OneRobot(StudyTask):
         """Progress message."""
         return f"{self.followed}: {self.robot.with_tail}"
 
-    @property
-    def index(self) -> int:
-        """Index of the robot in the flat order of the study."""
-        return int(self.indices[0])
+    def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
+        """Compute every quantity, (1,); NaN, and the state 0, for a robot that cannot be followed."""
+        found: dict[str, float] = dict.fromkeys(self.needed, np.nan)
+        found |= {"state": 0.0} if "state" in self.needed else {}
+        with suppress(InputError):
+            found |= self.follow(loaded)
+        return {name: np.array([value]) for name, value in found.items()}
+
+    def follow(self, loaded: LoadedStudy, /) -> dict[str, float]:
+        """Compute the quantities that the robot has."""
+        raise NotImplementedError
 
 
 def flag_attributes(meaning: str, source: str, names: Sequence[str]) -> dict[str, Any]:
@@ -233,7 +240,7 @@ def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequenc
     first = answers[0][1][name]
     values = np.full((int(np.prod(shape)), *first.shape[1:]), np.nan)
     for task, part in answers:
-        values[task.index] = part[name][0]
+        values[task.indices[0]] = part[name][0]
     return values.reshape(*shape, *first.shape[1:])
 
 
@@ -278,8 +285,7 @@ def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:
 
 def _friction_at(loaded: LoadedStudy, index: int) -> float:
     """B_eff of a robot: that which was fitted to its tail, else its own; NaN where unset."""
-    robot = loaded.robot_at(index)
-    own = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction)).friction.effective
+    own = loaded.with_friction(loaded.robot_at(index)).friction.effective
     return float("nan") if own is None else own
 
 
@@ -298,16 +304,11 @@ def _swum(
     quick: QuickParts, reading: str, tail_rate: PerRobot | None = None, motor_rate: PerRobot | None = None
 ) -> Swimming:
     """Steady swimming of all parts of a batch."""
-
-    def cut_of(rates: PerRobot | None, cut: slice) -> PerRobot | None:
-        return None if rates is None else rates[cut]
-
-    return joined(
-        [
-            swim(batch, model, tail_rate=cut_of(tail_rate, cut), motor_rate=cut_of(motor_rate, cut), friction=reading)
-            for cut, batch, model in quick
-        ]
-    )
+    found = []
+    for cut, batch, model in quick:
+        tail, motor = (None if rate is None else rate[cut] for rate in (tail_rate, motor_rate))
+        found.append(swim(batch, model, tail_rate=tail, motor_rate=motor, friction=reading))
+    return joined(found)
 
 
 def _speed_errors(quick: QuickParts, reading: str, found: Swimming) -> PerRobot:
@@ -333,8 +334,7 @@ def _intervals(task: ModelTask, loaded: LoadedStudy, posterior: PosteriorFile) -
     for number, index in enumerate(task.indices.tolist()):
         if not inside[number]:
             continue
-        robot = loaded.robot_at(index)
-        robot = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction))
+        robot = loaded.with_friction(loaded.robot_at(index))
         for column, reading in enumerate(readings):
             found = intervals_of(robot, model, posterior, tail_rate=None, friction=reading)
             found = found if knows_torque(robot, model) else without_torque(found)
