@@ -22,7 +22,7 @@ from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import WALLED
 from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Picture, Sheet
+from spirillum.view.figures.sheet import Picture, Sheet, write_beside
 from spirillum.view.figures.style import (
     COLOURS,
     PAGE,
@@ -212,24 +212,17 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
         axes.plot(value, row, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
         if name != comparison.reference and reference != 0:
             share = value / reference - 1.0
-            axes.annotate(
-                f"{100 * share:+.{1 if abs(share) < 0.0995 else 0}f} %".replace("-", "−"),
-                (value * (1 + (error or 0.0)), row),
-                xytext=(6 if value >= 0 else -6, 0),
-                textcoords="offset points",
-                ha="left" if value >= 0 else "right",
-                va="center",
-                size=7.5,
-                color="#333333",
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8},
-                zorder=6,
-            )
+            words = f"{100 * share:+.{1 if abs(share) < 0.0995 else 0}f} %".replace("-", "−")
+            shift, side = ((6, 0), "left") if value >= 0 else ((-6, 0), "right")
+            write_beside(axes, words, (value * (1 + (error or 0.0)), row), shift, ha=side, **_SHARE)
     _finish(axes, np.array([*values.values()]) / scale.factor)
     unit = "" if scale.unit == "1" else f" ({scale.unit})"
     axes.set_xlabel(f"{panel.name}\n{panel.symbol}{unit}")
 
 
 _WORDS: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#777777", "style": "italic"}
+_PALE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
+_SHARE: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#333333", "bbox": _PALE, "zorder": 6}
 
 
 def _finish(axes: Axes, values: np.ndarray) -> None:
@@ -311,14 +304,5 @@ def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:
         if row + 1 < speeds.size:
             axes.plot([now, now], [row, row + 1], color="#999999", linewidth=0.6, zorder=1)
         factor = f"  × {now / was:.2f}" if row and was != 0.0 else ""
-        axes.annotate(
-            f"{now:.3g}{factor}",
-            (max(was, now), row),
-            xytext=(6, 0),
-            textcoords="offset points",
-            ha="left",
-            va="center",
-            size=8,
-            color="#333333",
-        )
+        write_beside(axes, f"{now:.3g}{factor}", (max(was, now), row), (6, 0), va="center", size=8, color="#333333")
     axes.grid(visible=False, axis="y")

@@ -11,12 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import NullLocator
 
 from spirillum.arrays import Values
 from spirillum.units import Hz
-from spirillum.view.figures.scene import label
+from spirillum.view.figures.scene import arrow, label
 from spirillum.view.figures.section import draw_glass, draw_section
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, in_words, plain, styled
@@ -230,18 +229,9 @@ def _draw_heading(axes: Axes, flow: Flow, view: _View) -> None:
     along = flow.heading[["xyz".index(view.first), "xyz".index(view.second)]]
     start = np.array([end + sense * 0.2 * reach, 0.0]) / unit
     stop = start + sense * 1.2 * reach / unit * along
-    axes.add_patch(
-        FancyArrowPatch(
-            (float(start[0]), float(start[1])),
-            (float(stop[0]), float(stop[1])),
-            arrowstyle="simple,head_length=0.5,head_width=0.55,tail_width=0.2",
-            mutation_scale=18,
-            facecolor=COLOURS["orange"],
-            edgecolor="white",
-            linewidth=0.7,
-            zorder=9,
-        )
-    )
+    shape = "simple,head_length=0.5,head_width=0.55,tail_width=0.2"
+    swims = {"facecolor": COLOURS["orange"], "edgecolor": "white", "linewidth": 0.7, "zorder": 9}
+    arrow(axes, start, stop, arrowstyle=shape, mutation_scale=18, shrinkA=2, shrinkB=2, **swims)
     x, y = 0.5 * (start + stop) + np.array([0.0, 0.28 * body.diameter / unit])
     label(axes, x, y, "$U_x$", size=9, color="black")
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from spirillum.swimming.prediction import Prediction
-from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.sheet import Sheet, write_beside
 from spirillum.view.figures.style import COLOURS, UnitPrefix, plain, styled
 
 _SPEED = "forward_velocity"
@@ -46,14 +46,7 @@ def prediction_figure(prediction: Prediction) -> Figure:
             axes.plot(speed, number, "o", color=row.colour, markersize=6.5)
             words = f"{speed:.4g}" if np.isnan(low) else f"{speed:.4g} ({low:.4g} to {high:.4g})"
             end = np.nanmax([speed, high])
-            axes.annotate(
-                words.replace("-", "\N{MINUS SIGN}"),
-                (end, number),
-                xytext=(7, 0),
-                textcoords="offset points",
-                va="center",
-                size=8,
-            )
+            write_beside(axes, words.replace("-", "\N{MINUS SIGN}"), (end, number), (7, 0), va="center", size=8)
         ends = np.array([(row.speed, row.low, row.high) for row in rows]) / scale.factor
         least, most = min(float(np.nanmin(ends)), 0.0), max(float(np.nanmax(ends)), 0.0)
         axes.set_xlim(_ROOM * least, most + (_ROOM - 1.0) * (most - least))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
+from matplotlib.patches import Ellipse, Rectangle
 
 from spirillum.robot.links import outlines_of
 from spirillum.robot.mesh import is_steel
@@ -19,6 +20,7 @@ from spirillum.view.figures.scene import (
     PHASE,
     DrawingLayout,
     Metal,
+    arrow,
     dimension_line,
     draw_solid,
     draw_wire,
@@ -44,18 +46,12 @@ def draw_dimensions(axes: Axes, s: DrawingLayout) -> None:
         label(axes, x + 0.008 * s.total, 0.35 * radius, s.words("D_b", robot.body.diameter), ha="left")
     if robot.channel is not None:
         x = s.nose + 0.115 * s.total
+        words = s.words("D_{ch}", robot.channel.diameter)
         if s.ceiling is not None:
             dimension_line(axes, (x, s.floor), (x, s.ceiling))
-            label(
-                axes,
-                x + 0.008 * s.total,
-                0.5 * (s.floor + s.ceiling),
-                s.words("D_{ch}", robot.channel.diameter),
-                ha="left",
-            )
+            label(axes, x + 0.008 * s.total, 0.5 * (s.floor + s.ceiling), words, ha="left")
         else:
-            text = f"{s.words('D_{ch}', robot.channel.diameter)}\n(upper wall\nout of view)"
-            label(axes, x, 0.4 * s.half_height, text, ha="left", size=7.5)
+            label(axes, x, 0.4 * s.half_height, f"{words}\n(upper wall\nout of view)", ha="left", size=7.5)
     _tail_dimensions(axes, s)
 
 
@@ -196,21 +192,12 @@ def _draw_robot(axes: Axes, s: DrawingLayout) -> None:
     if robot.channel is not None:
         shadow = 0.010 * s.total
         for share in (1.0, 0.8, 0.6, 0.4):
-            ellipse = Ellipse(
-                (0.0, s.floor), 2.0 * s.nose * share, shadow * share, color="#24414f", alpha=0.16, zorder=2.5
-            )
-            axes.add_patch(ellipse)
-    axes.plot(
-        [s.tip - 0.02 * s.total, s.nose + 0.02 * s.total],
-        [0, 0],
-        color=FAINT,
-        linewidth=0.7,
-        dashes=(9, 3, 2, 3),
-        zorder=3,
-    )
-    draw_wire(
-        axes, robot, _COUPLING if is_steel(robot.tail.density) else _COPPER, phase=PHASE, unit=unit, points=s.points
-    )
+            size = 2.0 * s.nose * share, shadow * share
+            axes.add_patch(Ellipse((0.0, s.floor), *size, color="#24414f", alpha=0.16, zorder=2.5))
+    axis = (s.tip - 0.02 * s.total, s.nose + 0.02 * s.total)
+    axes.plot(axis, (0, 0), color=FAINT, linewidth=0.7, dashes=(9, 3, 2, 3), zorder=3)
+    metal = _COUPLING if is_steel(robot.tail.density) else _COPPER
+    draw_wire(axes, robot, metal, phase=PHASE, unit=unit, points=s.points)
     outlines = outlines_of(robot)
     for name, colours, order in (("coupling", _COUPLING, 7), ("body", _BODY, 8)):
         if name in outlines:
@@ -223,18 +210,8 @@ def _turning(axes: Axes, s: DrawingLayout, x: float, reach: float, sense: float,
     start, end = (x, sense * reach), (x, -sense * reach)
     curve = f"arc3,rad={-0.45 * sense:.3f}"
     for colour, width, order in (("white", 3.6, 9.4), (COLOURS["vermillion"], 1.7, 9.5)):
-        axes.add_patch(
-            FancyArrowPatch(
-                start,
-                end,
-                connectionstyle=curve,
-                arrowstyle="-|>",
-                mutation_scale=8,
-                linewidth=width,
-                color=colour,
-                zorder=order,
-            )
-        )
+        look = {"color": colour, "linewidth": width, "zorder": order}
+        arrow(axes, start, end, connectionstyle=curve, mutation_scale=8, shrinkA=2, shrinkB=2, **look)
     label(axes, x, reach + 0.008 * s.total, text, va="bottom", color=COLOURS["vermillion"], weight="bold")
 
 
@@ -242,18 +219,9 @@ def _draw_motion(axes: Axes, s: DrawingLayout) -> None:
     sense = _sense(s.robot)
     start, end = s.nose + 0.018 * s.total, s.nose + 0.095 * s.total
     start, end = (start, end) if sense > 0 else (end, start)
-    axes.add_patch(
-        FancyArrowPatch(
-            (start, 0.0),
-            (end, 0.0),
-            arrowstyle="simple,head_length=0.55,head_width=0.6,tail_width=0.22",
-            mutation_scale=18,
-            facecolor=COLOURS["blue"],
-            edgecolor="white",
-            linewidth=0.8,
-            zorder=12,
-        )
-    )
+    shape = "simple,head_length=0.55,head_width=0.6,tail_width=0.22"
+    swims = {"facecolor": COLOURS["blue"], "edgecolor": "white", "linewidth": 0.8, "zorder": 12}
+    arrow(axes, (start, 0.0), (end, 0.0), arrowstyle=shape, mutation_scale=18, shrinkA=2, shrinkB=2, **swims)
     label(axes, 0.5 * (start + end), 0.045 * s.total, "$U_x$", color=COLOURS["blue"], size=9)
     turn = s.robot.hand * sense
     radius = 0.5 * s.robot.body.diameter / s.scale.factor
@@ -264,24 +232,10 @@ def _draw_motion(axes: Axes, s: DrawingLayout) -> None:
 
 
 def _draw_frame(axes: Axes, s: DrawingLayout) -> None:
-    axes.text(
-        s.left + 0.012 * s.total,
-        s.top - 0.012 * s.total,
-        plain(s.robot.name, 60),
-        va="top",
-        size=9,
-        weight="bold",
-        color=INK,
-    )
-    axes.text(
-        s.right - 0.012 * s.total,
-        s.top - 0.014 * s.total,
-        "computed geometry, to scale",
-        va="top",
-        ha="right",
-        size=7.5,
-        color=FAINT,
-    )
+    edge, line = 0.012 * s.total, s.top - 0.012 * s.total
+    axes.text(s.left + edge, line, plain(s.robot.name, 60), va="top", size=9, weight="bold", color=INK)
+    small: dict[str, Any] = {"va": "top", "ha": "right", "size": 7.5, "color": FAINT}
+    axes.text(s.right - edge, line - 0.002 * s.total, "computed geometry, to scale", **small)
     _compass(axes, s)
     length = round_length(0.16 * s.total * s.scale.factor)
     end = s.right - 0.02 * s.total
@@ -293,16 +247,5 @@ def _draw_frame(axes: Axes, s: DrawingLayout) -> None:
 def _compass(axes: Axes, s: DrawingLayout) -> None:
     x, z, size = s.left + 0.025 * s.total, s.bottom + 0.025 * s.total, 0.055 * s.total
     for dx, dz, name in ((size, 0.0, "$x$"), (0.0, size, "$z$")):
-        axes.add_patch(
-            FancyArrowPatch(
-                (x, z),
-                (x + dx, z + dz),
-                arrowstyle="-|>",
-                mutation_scale=6,
-                linewidth=0.9,
-                color=INK,
-                shrinkA=0,
-                shrinkB=0,
-            )
-        )
+        arrow(axes, (x, z), (x + dx, z + dz), mutation_scale=6, linewidth=0.9)
         label(axes, x + 1.22 * dx, z + 1.22 * dz, name)

@@ -211,7 +211,8 @@ def draw_means(axes: Axes, x: Values, y: Values, half: Values, *, hollow: bool =
 
 
 def _observed_rows(shown: StudyView) -> list[PanelRow]:
-    reading = shown.prescribed_friction_model
+    # At prescribed rates friction in the joint leaves the motion alone.
+    reading = next((name for name in ("rotor", "none") if name in shown.readings), shown.readings[0])
     speed = shown.scale("m/s", "observed_forward_velocity", "forward_velocity_at_observed_rate", friction=[reading])
     inferring = [name for name in ("rotor", "paper") if name in shown.readings]
 
@@ -262,8 +263,15 @@ def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> PanelR
 
 def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
     """Legend entries for models, readings and observations."""
-    readings = _friction_entries(shown) if own_drive else ()
-    return [*_model_entries(shown), *band_handles(shown), *readings, *_observed_entries(shown)]
+    found = []
+    for model in shown.models:
+        look = look_of_model(model)
+        line: Any = look.line if shown.grid else "none"
+        found.append(Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model)))
+    found += [*band_handles(shown), *(_friction_entries(shown) if own_drive else ())]
+    if shown.observed:
+        found.append(Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="observed, 95 % interval"))
+    return found
 
 
 def band_handles(shown: StudyView) -> list[Line2D]:
@@ -279,32 +287,13 @@ def settled_handles(shown: StudyView) -> list[Line2D]:
     return [Line2D([], [], **_SETTLED, label="released, steady state")] if shown.settled else []
 
 
-def _model_entries(shown: StudyView) -> Iterator[Line2D]:
-    for model in shown.models:
-        look = look_of_model(model)
-        line: Any = look.line if shown.grid else "none"
-        yield Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model))
-
-
 def _friction_entries(shown: StudyView) -> Iterator[Line2D]:
     """Filled and hollow marks: those of the model, or of several models a grey circle."""
     only = look_of_model(shown.models[0]) if len(shown.models) == 1 else None
     colour, marker = ("#555555", "o") if only is None else (only.colour, only.marker)
     for number, reading in enumerate(shown.free_friction_models):
-        yield Line2D(
-            [],
-            [],
-            color=colour,
-            linestyle="none",
-            marker=marker,
-            markerfacecolor="white" if number else colour,
-            label=shown.friction_label(reading),
-        )
-
-
-def _observed_entries(shown: StudyView) -> Iterator[Line2D]:
-    if shown.observed:
-        yield Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="observed, 95 % interval")
+        look: dict[str, Any] = {"color": colour, "marker": marker, "markerfacecolor": "white" if number else colour}
+        yield Line2D([], [], linestyle="none", **look, label=shown.friction_label(reading))
 
 
 def amplitude_handles(shown: StudyView) -> list[Line2D]:
@@ -321,12 +310,7 @@ def amplitude_handles(shown: StudyView) -> list[Line2D]:
         line = look_of_model(model).line
         entries.append(Line2D([], [], color="#555555", linestyle=line, linewidth=1.1, label=label_of_model(model)))
     if shown.rotor_friction is not None:
-        label = f"rotor friction $B_m$ = {_power_of_ten(shown.rotor_friction)}"
+        digits, power = f"{shown.rotor_friction:.0e}".split("e")
+        label = f"rotor friction $B_m$ = ${digits}\\times10^{{{int(power)}}}$"
         entries.append(Line2D([], [], **_OWN, label=label))
     return entries
-
-
-def _power_of_ten(value: float) -> str:
-    """A positive number as a formula, one digit."""
-    digits, power = f"{value:.0e}".split("e")
-    return f"${digits}\\times10^{{{int(power)}}}$"

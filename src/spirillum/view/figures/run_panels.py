@@ -13,6 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.run_summary import merged_events
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
+from spirillum.view.figures.sheet import write_beside
 from spirillum.view.figures.style import COLOURS, UnitPrefix, plain
 
 if TYPE_CHECKING:
@@ -55,16 +56,10 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
     positions = [(when - first) / span for when, _ in events[:_MOST_EVENTS]]
     for numbers in _close_together(positions) if numbered else []:
         left = _left_end([positions[number] for number in numbers])
-        axes.annotate(
-            str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
-            (first + (left + 0.5 * _WIDE[len(numbers) > 1]) * span, 1.0),
-            xycoords=axes.get_xaxis_transform(),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            size=7,
-            color="#555555",
-        )
+        words = str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}"
+        at = first + (left + 0.5 * _WIDE[len(numbers) > 1]) * span, 1.0
+        look = {"xycoords": axes.get_xaxis_transform(), "ha": "center", "size": 7, "color": "#555555"}
+        write_beside(axes, words, at, (0, 2), **look)
 
 
 def _left_end(positions: list[float]) -> float:

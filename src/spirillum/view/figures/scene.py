@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -217,13 +219,15 @@ class DrawingLayout:
         return f"${symbol}$ = {in_words(value, 'm')}"
 
 
+def arrow(axes: Axes, start: Sequence[float] | Values, end: Sequence[float] | Values, **look: Any) -> None:
+    """An arrow from tip to tip, thin and dark unless `look` says otherwise."""
+    look = {"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0, **({} if "facecolor" in look else {"color": INK}), **look}
+    axes.add_patch(FancyArrowPatch((start[0], start[1]), (end[0], end[1]), **look))
+
+
 def dimension_line(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
     """A dimension line with an arrowhead at both ends."""
-    axes.add_patch(
-        FancyArrowPatch(
-            start, end, arrowstyle="<|-|>", mutation_scale=5, linewidth=0.8, color=INK, shrinkA=0, shrinkB=0, zorder=12
-        )
-    )
+    arrow(axes, start, end, arrowstyle="<|-|>", mutation_scale=5, linewidth=0.8, zorder=12)
 
 
 def thin_line(axes: Axes, xs: tuple[float, float], zs: tuple[float, float]) -> None:

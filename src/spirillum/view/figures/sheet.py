@@ -54,6 +54,11 @@ def add_letters(panels: Iterable[Axes]) -> None:
         axes.set_title(f"{name})", loc="left", pad=3, weight="bold")
 
 
+def write_beside(axes: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **look: Any) -> None:
+    """Write text that stands off a point of the axes, by typographic points."""
+    axes.annotate(text, at, xytext=shift, textcoords="offset points", **look)
+
+
 class Sheet:
     """A figure with a grid of lettered panels of given height below title, subtitle and legend, notes at the foot.
 

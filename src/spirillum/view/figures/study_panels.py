@@ -148,11 +148,6 @@ class StudyView:
             return f"rotor friction $B_m$ only{'' if self.shaded else ' (upper bound)'}"
         return f"friction model '{reading}'"
 
-    @property
-    def prescribed_friction_model(self) -> str:
-        """Reading under which the models run at prescribed rates: `rotor`, which leaves their motion alone."""
-        return next((name for name in ("rotor", "none") if name in self.readings), self.readings[0])
-
     @cached_property
     def rotor_friction(self) -> float | None:
         """B_m, with a gear B_m G^2, if all robots share one, N m s/rad."""
@@ -183,18 +178,18 @@ class StudyView:
     @cached_property
     def banded(self) -> tuple[str, ...]:
         """Names of the models that have a band over unspecified poses."""
-        if "forward_velocity_low" not in self.whole:
-            return ()
-        known = self.whole["forward_velocity_low"]
-        return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
+        return self._models_with("forward_velocity_low")
 
     @cached_property
     def with_intervals(self) -> tuple[str, ...]:
         """Names of the models that have intervals of a posterior."""
-        if "forward_velocity_interval_low" not in self.whole:
+        return self._models_with("forward_velocity_interval_low")
+
+    def _models_with(self, name: str) -> tuple[str, ...]:
+        """Names of the models for which a quantity is finite anywhere."""
+        if name not in self.whole:
             return ()
-        known = self.whole["forward_velocity_interval_low"]
-        return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
+        return tuple(model for model in self.models if bool(np.isfinite(self.whole[name].sel(model=model)).any()))
 
     def band(self, name: str, model: str) -> tuple[Values, Values]:
         """Limits of a quantity of free swimming, of a posterior or over unspecified poses, SI; NaN without them."""
@@ -223,20 +218,17 @@ class StudyView:
         names, reading = ", ".join(self.with_intervals), self.free_friction_models[-1]
         return f"Shades: 95 % intervals of the posterior ({names}, friction model '{reading}'), discrepancy included."
 
-    @property
-    def _words_of_first_friction_model(self) -> str:
-        reading = self.free_friction_models[0]
-        return "without friction" if reading == "none" else f"friction model '{reading}'"
-
     def _band_words(self) -> str:
         if not self.banded:
             return ""
         gaps = np.asarray(self.whole["gap_at_place"].values, dtype=float)
         pitches = np.degrees(np.asarray(self.whole["pitch_at_place"].values, dtype=float))
+        reading = self.free_friction_models[0]
+        friction = "without friction" if reading == "none" else f"friction model '{reading}'"
         return (
             f"Bands: the least to the largest value over gaps of {np.nanmin(gaps) * 1e3:.3g} to "
             f"{np.nanmax(gaps) * 1e3:.3g} mm and pitches of {np.nanmin(pitches):.3g} to {np.nanmax(pitches):.3g} deg "
-            f"({self._words_of_first_friction_model}), none of them likelier than another."
+            f"({friction}), none of them likelier than another."
         )
 
     def observed_motor_rate(self) -> tuple[Values, Values]:

@@ -22,7 +22,7 @@ from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
 from spirillum.units import show, show_height, speed_unit
 from spirillum.view.figures.run_panels import draw_cross_section, event_words, events_of, mark_events
-from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.sheet import Sheet, write_beside
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
@@ -62,6 +62,15 @@ def _panels(run: str) -> list[_Panel]:
     return found
 
 
+_LEGEND: dict[str, Any] = {
+    "handlelength": 1.8,
+    "columnspacing": 1.0,
+    "borderaxespad": 0.2,
+    "labelspacing": 0.2,
+    "frameon": True,
+    "framealpha": 0.8,
+    "edgecolor": "none",
+}
 _DOTS: dict[str, Any] = {"dots": (0, (1, 1.2))}  # line styles that matplotlib has no name for
 _LOOK_OF = {
     row["label"]: (row["colour"], _DOTS.get(row["line"], row["line"])) for row in rows_of("view/figures/run_lines.csv")
@@ -263,17 +272,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
     axes.set_ylabel(f"{panel.label}{' ' if beside > 1 else chr(10)}({scale.unit})")
     if any(words for words, _ in lines) and not (film and len(lines) == 1):
         columns = len(lines) if sum(len(words) + 7 for words, _ in lines) <= _LETTERS_BESIDE else 2
-        axes.legend(
-            loc="upper right",
-            ncols=columns,
-            handlelength=1.8,
-            columnspacing=1.0,
-            borderaxespad=0.2,
-            labelspacing=0.2,
-            frameon=True,
-            framealpha=0.8,
-            edgecolor="none",
-        )
+        axes.legend(loc="upper right", ncols=columns, **_LEGEND)
         _make_room(axes, -(-len(lines) // columns) * (1.0 if beside > 1 else 2.0))
 
 
@@ -284,16 +283,9 @@ def _draw_gap_axis(axes: Axes, dataset: xr.Dataset, values: Samples, scale: Unit
     if roughness > 0:
         low = min(low, roughness)
         axes.axhline(roughness / scale.factor, color="#555555", linewidth=0.9, linestyle=(0, (1, 1.5)))
-        axes.annotate(
-            "roughness",
-            (0.01, roughness / scale.factor),
-            xycoords=axes.get_yaxis_transform(),
-            xytext=(0, 2),
-            textcoords="offset points",
-            size=7.5,
-            color="#555555",
-            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8},
-        )
+        pale = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
+        look: dict[str, Any] = {"xycoords": axes.get_yaxis_transform(), "size": 7.5, "color": "#555555", "bbox": pale}
+        write_beside(axes, "roughness", (0.01, roughness / scale.factor), (0, 2), **look)
     axes.set_yscale("log")
     axes.set_ylim(0.6 * low / scale.factor, max(1.6 * high, 10.0 * low) / scale.factor)
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if high > _DECADES_BARE * low else (1.0, 2.0, 5.0), numticks=7))

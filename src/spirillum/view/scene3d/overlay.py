@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyArrowPatch
 
 from spirillum.arrays import Samples
-from spirillum.view.figures.scene import FAINT, INK, label, round_length
+from spirillum.view.figures.scene import FAINT, INK, arrow, label, round_length
 from spirillum.view.figures.style import UnitPrefix, in_words, plain, styled
 from spirillum.view.scene3d.scenery import SceneCamera
 
@@ -150,17 +149,6 @@ def _draw_axes(axes: Axes, camera: SceneCamera, unit: float, size: tuple[int, in
     for name, way in shown.items():
         if np.hypot(*way) < 0.15 * reach:
             continue
-        axes.add_patch(
-            FancyArrowPatch(
-                tuple(origin),
-                tuple(origin + way),
-                arrowstyle="-|>",
-                mutation_scale=6.5 * unit,
-                linewidth=1.0 * unit,
-                color=INK,
-                shrinkA=0,
-                shrinkB=0,
-            )
-        )
+        arrow(axes, origin, origin + way, mutation_scale=6.5 * unit, linewidth=1.0 * unit)
         position = origin + way * (1.0 + 0.24 * reach / np.hypot(*way))
         label(axes, float(position[0]), float(position[1]), f"${name}$", size=8.5 * unit)
