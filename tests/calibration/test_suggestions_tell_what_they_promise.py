@@ -207,7 +207,9 @@ def test_a_robot_without_channel_is_refused(fitted: Path, robot: str) -> None:
 
 
 def test_two_robots_of_one_channel_are_refused(fitted: Path) -> None:
-    with pytest.raises(InputError, match=r"channel\.diameter = 40 mm of two robots, the second biorob2012-wide"):
+    with pytest.raises(
+        InputError, match=r"robots biorob2012-wide and biorob2012-wide have the same channel\.diameter = 40 mm"
+    ):
         sp.suggest(fitted / "posterior.nc", [WIDE, WIDE])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,12 +55,13 @@ class Calibrated(DisplayMixin):
     friction_statement: str  #: What the intervals of B_eff take as exact, in a sentence; empty where there is no B_eff.
     predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
     """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
-    discrepancy: dict[Quantity, Estimate]  #: Relative misfit of the model by robot, beyond the scatter of trials.
     error: dict[Quantity, float]  #: Relative error of one trial.
-    least_squares: LeastSquares | None
-    posterior: Posterior | None
-    identifiability: Identifiability | None
     warnings: tuple[Note, ...]
+    discrepancy: dict[Quantity, Estimate] = field(default_factory=dict)
+    """Relative misfit of the model by robot, beyond the scatter of trials; empty by the method 'paper'."""
+    least_squares: LeastSquares | None = None
+    posterior: Posterior | None = None
+    identifiability: Identifiability | None = None
     friction_given: tuple[Estimate, ...] = ()
     """B_eff of every robot with its constants as they are, on which predictions of these robots rest; empty where that
     is `friction`."""
@@ -90,10 +91,8 @@ def _content(found: Calibrated) -> dict[str, Any]:
     """What was fitted, quantity by quantity."""
     problem, experiment = found.problem, found.experiment
     parameters = {
-        item.label: quantity(
-            found.values[item.label].value,
-            item.parameter.unit or "1",
-            **found.values[item.label].interval,
+        item.label: found.values[item.label].quantity(
+            item.parameter.unit,
             meaning=item.parameter.meaning,
             prior=item.prior.words(item.parameter.unit) if found.method == "posterior" else None,
         )
@@ -110,7 +109,7 @@ def _content(found: Calibrated) -> dict[str, Any]:
         "friction": found.reading,
         "parameters": parameters,
         **({"effective_friction_statement": found.friction_statement} if found.friction_statement else {}),
-        "discrepancy": {name: quantity(v.value, "1", **v.interval) for name, v in found.discrepancy.items()},
+        "discrepancy": {name: size.quantity("1") for name, size in found.discrepancy.items()},
         "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
         "tails": [_tail(found, place) for place in range(experiment.size)],
     }
@@ -143,8 +142,7 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
     content: dict[str, Any] = {name: quantity(size, "m") for name, size in _geometry(robot).items()}
     content["rows"] = list(found.experiment.rows[place])
     if found.friction:
-        item = found.friction[place]
-        content["effective_friction"] = quantity(item.value, "N m s/rad", **item.interval)
+        content["effective_friction"] = found.friction[place].quantity("N m s/rad")
     for name, (values, low, high) in found.predicted.items():
         unit, _ = MEANINGS[name]
         content[f"{name}_observed"] = quantity(float(found.problem.ratio(name).mean[place]), unit)

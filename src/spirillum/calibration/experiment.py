@@ -138,7 +138,8 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
     """Read observations and lay them onto robots: by channel diameter; the tail is that of the row."""
     path = Path(path)
     observations = read_observations(path)
-    by_channel = _by_channel(robots)
+    allowed = "robots with the channels of the observations"
+    by_channel = robots_by_channel(robots, allowed, "by which rows are matched")
     groups: dict[tuple[float, float, float], list[ObservationRow]] = {}
     for item in observations:
         robot = by_channel.get(round(item.channel_diameter, 9))
@@ -195,18 +196,17 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
     )
 
 
-def _by_channel(robots: Sequence[Robot]) -> dict[float, Robot]:
+def robots_by_channel(robots: Sequence[Robot], allowed: str, use: str) -> dict[float, Robot]:
+    """Robots by the diameters of their channels, m, one for each; `allowed` are robots for a `use` of the channels."""
     found: dict[float, Robot] = {}
     for robot in robots:
         if robot.channel is None:
-            raise InputError(
-                f"robot {robot.name} has no channel; allowed: robots with the channels of the observations"
-            )
+            raise InputError(f"robot {robot.name} has no channel; allowed: {allowed}")
         other = found.setdefault(round(robot.channel.diameter, 9), robot)
         if other is not robot:
             raise InputError(
                 f"robots {other.name} and {robot.name} have the same channel.diameter = "
-                f"{robot.channel.diameter * 1e3:g} mm, by which rows are matched; allowed: one robot for each channel"
+                f"{robot.channel.diameter * 1e3:g} mm, {use}; allowed: one robot for each channel"
             )
     return found
 

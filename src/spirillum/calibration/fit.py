@@ -145,37 +145,26 @@ def fit_model(
             import_optional(library, "method 'posterior'", "posterior")
     problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare, answer=answer)
     inertia_warnings(experiment)
-    found = _fitted_by(method, problem, friction, sampling, progress, beside)
-    return replace(found, model_reason=choice.reason)
-
-
-def _fitted_by(
-    method: str,
-    problem: Problem,
-    friction: str,
-    sampling: Sampling | None,
-    progress: Progress | None,
-    beside: ProcessPoolExecutor | None,
-) -> Calibrated:
     if method == "paper":
-        return _by_paper(problem, friction)
+        return replace(_by_paper(problem, friction), model_reason=choice.reason)
     fit = least_squares_fit(problem)
     check_identifiable(problem, fit.z)
     check_plausible(problem, fit.z)
     report = identified(problem, fit)
     posterior = None if method == "least-squares" else sampled(problem, fit, sampling, progress, beside)
-    return _by_draws(problem, fit, report, reading=friction, posterior=posterior)
+    found = _by_draws(problem, fit, report, reading=friction, posterior=posterior)
+    return replace(found, model_reason=choice.reason)
 
 
 def _by_paper(problem: Problem, reading: str) -> Calibrated:
     factors = paper_fit(problem)
-    values = {name: Estimate(value, nan, nan) for name, value in factors.items()}
+    values = {name: Estimate(value) for name, value in factors.items()}
     z = problem.coordinate_of({name: np.array(value) for name, value in factors.items()})
     check_plausible(problem, z)
     friction: tuple[Estimate, ...] = ()
     if "friction" in problem.free:
         best = problem.friction(z[None], problem.experiment.motor_rate.mean[None], reading)[0]
-        friction = tuple(Estimate(float(value), nan, nan) for value in best)
+        friction = tuple(Estimate(float(value)) for value in best)
     sensitivity = friction_sensitivity(problem, z, reading)
     unknown = np.full(problem.experiment.size, nan)
     return Calibrated(
@@ -187,11 +176,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         friction_sensitivity=sensitivity,
         friction_statement=friction_statement(problem, friction, sensitivity),
         predicted={name: (values, unknown, unknown) for name, values in problem.predicted_at(z).items()},
-        discrepancy={},
         error={name: problem.ratio(name).pooled_error for name in problem.quantities},
-        least_squares=None,
-        posterior=None,
-        identifiability=None,
         warnings=(
             Note.named("no-uncertainty"),
             *outlier_warnings(problem, z),
@@ -293,7 +278,7 @@ def _friction(
         within = _estimates(middle, problem.friction(z, rates, reading, scaled))
     off = torque_error(problem)
     if off is None:
-        return given, within, tuple(Estimate(item.value, nan, nan) for item in given)
+        return given, within, tuple(Estimate(item.value) for item in given)
     # In Stokes flow a torque that is off by a factor is that of a fluid whose viscosity is.
     torque = np.exp(stated_spread(off) * own.normal(size=(z.shape[0], 1)))
     scaled["viscosity"] = scaled.get("viscosity", 1.0) * torque
@@ -307,17 +292,12 @@ def _estimates(middle: Samples, draws: Samples) -> tuple[Estimate, ...]:
 
 
 def _predicted(
-    problem: Problem,
-    best: Samples,
-    z: Samples,
-    discrepancy: Mapping[Quantity, float | Samples],
-    rng: np.random.Generator,
+    problem: Problem, best: Samples, z: Samples, discrepancy: Mapping[Quantity, Samples], rng: np.random.Generator
 ) -> dict[Quantity, tuple[Samples, Samples, Samples]]:
     draws, middles = problem.predicted(z), problem.predicted_at(best)
     found: dict[Quantity, tuple[Samples, Samples, Samples]] = {}
     for name, values in draws.items():
-        tau = np.reshape(np.asarray(discrepancy[name], dtype=float), (-1, 1))
-        spread = values * (1.0 + tau * rng.normal(size=values.shape))
+        spread = values * (1.0 + discrepancy[name][:, None] * rng.normal(size=values.shape))
         low, high = _limits(spread)
         middle = middles[name]
         found[name] = (middle, np.minimum(low, middle), np.maximum(high, middle))

@@ -59,16 +59,12 @@ def check_plausible(problem: Problem, z: Samples) -> None:
 def prior_warnings(problem: Problem, z: Samples) -> list[Note]:
     """Fitted values far out in their prior."""
     values = problem.values_at(z)
-    return [
-        Note(
-            "prior-decides",
-            f"{item.label} = {values[item.label]:.3g} lies {abs(place):.1f} standard deviations from its prior's "
-            f"median ({item.prior.words(item.parameter.unit)}); check model, units and robot",
-            (item.label,),
-        )
-        for item, place in zip(problem.coordinates, z, strict=True)
-        if abs(place) > FAR
-    ]
+    found = []
+    for item, place in zip(problem.coordinates, z, strict=True):
+        if abs(place) > FAR:
+            prior, said = item.prior.words(item.parameter.unit), {"label": item.label, "value": values[item.label]}
+            found.append(Note.named("far-from-prior", off=abs(place), prior=prior, fields=(item.label,), **said))
+    return found
 
 
 def edge_warnings(problem: Problem, draws: Samples) -> list[Note]:
@@ -85,12 +81,8 @@ def edge_warnings(problem: Problem, draws: Samples) -> list[Note]:
             ("upper", item.prior.high, float(np.mean(share > 1.0 - _EDGE))),
         ):
             if near > _PILED:
-                words = (
-                    f"{item.label}: {percent(near)} of the posterior lies at the {end} end of its prior "
-                    f"({value:.3g} {item.parameter.unit}".rstrip()
-                    + "), which decides the interval; check the model"
-                )
-                found.append(Note("prior-decides", words, (item.label,)))
+                said = {"label": item.label, "share": percent(near), "end": end, "fields": (item.label,)}
+                found.append(Note.named("at-end-of-prior", value=f"{value:.3g} {item.parameter.unit}".rstrip(), **said))
     return found
 
 
@@ -107,53 +99,33 @@ def outlier_warnings(problem: Problem, z: Samples) -> list[Note]:
         limit = max(_OUTLYING * float(mad_scale(off)), _LEAST_OUTLYING)
         for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
             rows = ", ".join(str(row) for row in experiment.rows[place])
-            words = (
-                f"row {rows}: the {CALLED[name]} of {experiment.labels()[place]} is {percent(float(relative[place]))} "
-                "off the fit, far more than that of other tails; check the row"
-            )
-            found.append(Note("outlier", words, (name,)))
+            said = {"rows": rows, "called": CALLED[name], "robot": experiment.labels()[place], "fields": (name,)}
+            found.append(Note.named("outlying-tail", off=percent(float(relative[place])), **said))
     return found
 
 
 def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], fit: LeastSquares) -> list[Note]:
     """State the model's discrepancy, so that a wrong model does not look certain."""
     found = []
-    model = problem.model.name
     for name, size in discrepancy.items():
-        called, code = CALLED[name], "intervals-incomplete"
+        words = {"model": problem.model.name, "called": CALLED[name], "fields": (name,)}
         misfit = min(size.value, fit.discrepancy[name])  # by the residuals, and not the prior alone
         few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).is_observed) == 1
         if (few or one) and misfit > _BEYOND_TRIALS:
-            share = percent(fit.discrepancy[name])
-            found.append(Note.named("factors-miss", model=model, called=called, share=share, fields=(name,)))
-        if few:
-            words = (
-                f"the fit has as many free numbers as means of the {called}: the misfit of '{model}' is unknown, and a "
-                "typical one is used; measure more tails"
-            )
-        elif one:
-            words = (
-                f"one tail's {called} does not tell the misfit of '{model}': a typical one is used; measure more tails"
-            )
+            found.append(Note.named("factors-miss", share=percent(fit.discrepancy[name]), **words))
+        beyond = ""
+        if few or one:
+            found.append(Note.named("misfit-of-no-rest" if few else "misfit-of-one-tail", **words))
         elif not problem.ratio(name).freedom.sum() > 0:
             once = not np.any(problem.ratio(name).trials > 1)
             why = "was observed once a tail" if once else "has means without scatter"
-            words = f"the {called} {why}: errors of trials and of the model cannot be separated; repeat trials"
-            if size.value > _BEYOND_TRIALS:
-                found.append(Note(code, words, (name,)))
-                code, words = "misfit", _misfit(model, called, size.value, "more than trials err")
+            found.append(Note.named("trials-without-scatter", why=why, **words))
+            beyond = "more than trials err" if size.value > _BEYOND_TRIALS else ""
         elif misfit > _LARGE_MISFIT:
-            code, words = "misfit", _misfit(model, called, size.value, "beyond the scatter of trials")
-        else:
-            continue
-        found.append(Note(code, words, (name,)))
+            beyond = "beyond the scatter of trials"
+        if beyond:
+            found.append(Note.named("tails-missed", size=percent(size.value), beyond=beyond, **words))
     return found
-
-
-def _misfit(model: str, called: str, size: float, beyond: str) -> str:
-    """That a model misses a quantity from tail to tail."""
-    misses = f"'{model}' misses the {called} by {percent(size)} from tail to tail, {beyond}"
-    return f"{misses}: fitted numbers compensate for it and hold for these tails only"
 
 
 def factor_misfit_warnings(problem: Problem, z: Samples) -> list[Note]:
@@ -163,11 +135,8 @@ def factor_misfit_warnings(problem: Problem, z: Samples) -> list[Note]:
         ratio = problem.ratio(name)
         size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.is_observed] ** 2)))
         if size > _LARGE_MISFIT:
-            words = (
-                f"'{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root mean "
-                "square over the tails, errors of trials included)"
-            )
-            found.append(Note("misfit", words, (name,)))
+            words = {"model": problem.model.name, "called": CALLED[name], "fields": (name,)}
+            found.append(Note.named("factors-leave", size=percent(size), **words))
     return found
 
 
@@ -192,13 +161,7 @@ def friction_interval_warnings(problem: Problem) -> list[Note]:
     rate = problem.experiment.motor_rate
     if "friction" not in problem.free or not rate.is_observed.any() or rate.freedom.sum() > 0:
         return []
-    if rate.explained:
-        words = (
-            "one trial a tail: intervals of B_eff include its stated errors and not how trials differ; repeat trials"
-        )
-    else:
-        words = "the motor rate states no error: intervals of B_eff are too narrow; repeat trials or add *_ci95 columns"
-    return [Note("intervals-incomplete", words, ("friction",))]
+    return [Note.named("one-trial-a-tail" if rate.explained else "rate-without-error")]
 
 
 def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) -> list[Note]:
@@ -211,11 +174,8 @@ def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) ->
         if less.value >= more.value:
             continue
         overlap = " (their intervals overlap)" if less.high >= more.low else ""
-        words = (
-            f"{narrow} = {less.value:.3g} is less than {wide} = {more.value:.3g}{overlap}, though a narrower channel "
-            "has more drag; check which channel is which"
-        )
-        found.append(Note("drag-order", words, (narrow, wide)))
+        said = {"narrow": narrow, "less": less.value, "wide": wide, "more": more.value, "fields": (narrow, wide)}
+        found.append(Note.named("narrower-drags-less", overlap=overlap, **said))
     return found
 
 

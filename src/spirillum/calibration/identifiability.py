@@ -20,6 +20,7 @@ from spirillum.calibration.least_squares import (
     LARGEST,
     LEAST_ERROR,
     LeastSquares,
+    Spread,
     sensitivities,
     weighted_residuals,
     weighted_sensitivities,
@@ -87,7 +88,7 @@ def check_identifiable(problem: Problem, z: Samples) -> None:
 def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
     """Find the directions in which a fit is not determined, at its optimum."""
     error = {name: max(np.nan_to_num(value), LEAST_ERROR) for name, value in fit.error.items()}
-    jacobian = np.concatenate(list(weighted_sensitivities(problem, fit.z, error, fit.discrepancy).values()))
+    jacobian = np.concatenate(list(weighted_sensitivities(problem, fit.z, Spread(error, fit.discrepancy)).values()))
     columns = sensitivities(problem, fit.z)
     relative = np.concatenate([column[problem.ratio(name).is_observed] for name, column in columns.items()])
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
@@ -150,7 +151,7 @@ def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[Likel
     """Likelihood profile of every free parameter: the others are fitted again at each of its values."""
 
     def residuals(z: Samples) -> Samples:
-        return weighted_residuals(problem, z, fit.error, fit.discrepancy)
+        return weighted_residuals(problem, z, Spread(fit.error, fit.discrepancy))
 
     spread = np.clip(np.sqrt(np.diag(fit.covariance)), 1e-6, 2.0)
     least = float(np.sum(residuals(fit.z) ** 2))

@@ -21,6 +21,7 @@ rates, and the drag factor is one for each channel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,13 @@ FEWEST_LEFT = 0.5  #: Degrees of freedom below which a fit leaves no residual to
 _MIDDLE = 0.6745  # median of a half-normal number over its scale
 _SHARP = 0.01  # relative error assumed of all observations to count the parameters that a quantity constrains
 LEAST_ERROR = 1e-3  #: Relative error that no mean is known better than: else one would outweigh all others.
+
+
+class Spread(NamedTuple):
+    """By how much means differ from predictions, relative, by quantity."""
+
+    error: dict[Quantity, float]  #: Of one trial; NaN without repeated trials.
+    discrepancy: dict[Quantity, float]  #: From robot to robot, beyond the scatter of trials.
 
 
 @dataclass(frozen=True)
@@ -70,17 +78,12 @@ def sensitivities(problem: Problem, z: Samples) -> dict[Quantity, Samples]:
     }
 
 
-def standard_errors(
-    problem: Problem,
-    predicted: dict[Quantity, Samples],
-    error: dict[Quantity, float],
-    discrepancy: dict[Quantity, float],
-) -> dict[Quantity, Samples]:
+def standard_errors(problem: Problem, predicted: dict[Quantity, Samples], spread: Spread) -> dict[Quantity, Samples]:
     """Standard error of each mean against its prediction, in the quantity's unit."""
-    found: dict[Quantity, Samples] = {}
-    for name, values in predicted.items():
-        found[name] = np.sqrt(_noise(problem, name, error[name]) + (discrepancy[name] * values) ** 2)
-    return found
+    return {
+        name: np.sqrt(_noise(problem, name, spread.error[name]) + (spread.discrepancy[name] * values) ** 2)
+        for name, values in predicted.items()
+    }
 
 
 def _noise(problem: Problem, name: Quantity, error: float) -> Samples:
@@ -96,26 +99,26 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
     error = {name: problem.ratio(name).pooled_error for name in problem.quantities}
     scattered = {name: bool(error[name] > 0) or problem.ratio(name).explained for name in error}
     # Without known errors all means count alike, by their relative deviation.
-    discrepancy = {name: 0.0 if scattered[name] else 1.0 for name in problem.quantities}
-    z = _best(problem, problem.start, error, discrepancy, starts=_STARTS, prior=_BREATH)
+    spread = Spread(error, {name: 0.0 if scattered[name] else 1.0 for name in problem.quantities})
+    z = _best(problem, problem.start, spread, starts=_STARTS, prior=_BREATH)
     _check_blind(problem, z)
     chi2 = float("nan")
     if all(scattered.values()):
-        chi2 = float(np.sum(weighted_residuals(problem, z, error, discrepancy, prior=0.0) ** 2))
-    left = _degrees_of_freedom(problem, z, error, discrepancy)
+        chi2 = float(np.sum(weighted_residuals(problem, z, spread, prior=0.0) ** 2))
+    left = _degrees_of_freedom(problem, z, spread)
     for turn in range(8):
         found = _discrepancy(problem, z, error, left)
-        change = max(abs(found[name] - discrepancy[name]) for name in found)
-        discrepancy = found
+        change = max(abs(found[name] - spread.discrepancy[name]) for name in found)
+        spread = Spread(error, found)
         if change < 1e-4 and turn:
             break
-        z = _best(problem, z, error, discrepancy, starts=1, prior=1.0)
-        left = _degrees_of_freedom(problem, z, error, discrepancy)
-    jacobian = np.concatenate(list(weighted_sensitivities(problem, z, error, discrepancy).values()))
+        z = _best(problem, z, spread, starts=1, prior=1.0)
+        left = _degrees_of_freedom(problem, z, spread)
+    jacobian = np.concatenate(list(weighted_sensitivities(problem, z, spread).values()))
     return LeastSquares(
         z=z,
         covariance=np.linalg.inv(jacobian.T @ jacobian + np.eye(z.size)),  # with the prior's information
-        discrepancy=discrepancy,
+        discrepancy=spread.discrepancy,
         error=error,
         chi2=chi2,
         freedom=_count(problem) - z.size,
@@ -169,27 +172,18 @@ def _felt(problem: Problem, z: Samples) -> Samples:
     return np.asarray(np.max(seen, axis=0))
 
 
-def weighted_residuals(
-    problem: Problem,
-    z: Samples,
-    error: dict[Quantity, float],
-    discrepancy: dict[Quantity, float],
-    *,
-    prior: float = 1.0,
-) -> Samples:
+def weighted_residuals(problem: Problem, z: Samples, spread: Spread, *, prior: float = 1.0) -> Samples:
     """Residuals of least squares: means less predictions over their standard errors, and the prior's share."""
-    found: Samples = _residuals(problem, z[None], error, discrepancy, prior)[0]
+    found: Samples = _residuals(problem, z[None], spread, prior)[0]
     return found
 
 
-def _residuals(
-    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float], prior: float
-) -> Samples:
+def _residuals(problem: Problem, z: Samples, spread: Spread, prior: float) -> Samples:
     """`weighted_residuals` at many coordinates, (draws, free numbers), at once: (draws, residuals)."""
     predicted = problem.predicted(z)
     # A discrepancy is relative to the size of the mean here: else a large prediction would excuse itself.
     sized = {name: problem.ratio(name).scale for name in predicted}
-    errors = standard_errors(problem, sized, error, discrepancy)
+    errors = standard_errors(problem, sized, spread)
     parts = []
     for name, values in predicted.items():
         ratio = problem.ratio(name)
@@ -198,15 +192,7 @@ def _residuals(
     return found
 
 
-def _best(
-    problem: Problem,
-    start: Samples,
-    error: dict[Quantity, float],
-    discrepancy: dict[Quantity, float],
-    *,
-    starts: int,
-    prior: float,
-) -> Samples:
+def _best(problem: Problem, start: Samples, spread: Spread, *, starts: int, prior: float) -> Samples:
     """The best of several local fits; the first starts at the given point, the others are spread over the prior."""
     from scipy.optimize import least_squares
 
@@ -214,15 +200,15 @@ def _best(
         """Forward differences, all from one call: most of its cost does not depend on the number of points."""
         step = np.copysign(_SMALL_STEP * np.maximum(1.0, np.abs(z)), z)
         step = np.where(np.abs(z + step) > LARGEST, -step, step)
-        rows = _residuals(problem, np.concatenate([z[None], z + np.diag(step)]), error, discrepancy, prior)
+        rows = _residuals(problem, np.concatenate([z[None], z + np.diag(step)]), spread, prior)
         slopes: Samples = (rows[1:] - rows[0]).T / step
         return slopes
 
-    spread = np.random.default_rng(20120624).normal(size=(starts - 1, start.size))
+    others = np.random.default_rng(20120624).normal(size=(starts - 1, start.size))
     best, cost = start, np.inf
-    for first in (start, *spread):
+    for first in (start, *others):
         found = least_squares(
-            lambda z: weighted_residuals(problem, z, error, discrepancy, prior=prior),
+            lambda z: weighted_residuals(problem, z, spread, prior=prior),
             np.clip(first, -3.0, 3.0) if first is not start else first,
             jac=jacobian,
             bounds=(-LARGEST, LARGEST),
@@ -236,25 +222,21 @@ def _best(
     return np.asarray(best, dtype=float)
 
 
-def weighted_sensitivities(
-    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
-) -> dict[Quantity, Samples]:
+def weighted_sensitivities(problem: Problem, z: Samples, spread: Spread) -> dict[Quantity, Samples]:
     """Change of each seen mean over its standard error per unit of each coordinate, (seen robots, free numbers)."""
     predicted = problem.predicted_at(z)
-    errors = standard_errors(problem, predicted, error, discrepancy)
-    found: dict[Quantity, Samples] = {}
-    for name, column in sensitivities(problem, z).items():
-        found[name] = (column * (predicted[name] / errors[name])[:, None])[problem.ratio(name).is_observed]
-    return found
+    errors = standard_errors(problem, predicted, spread)
+    return {
+        name: (column * (predicted[name] / errors[name])[:, None])[problem.ratio(name).is_observed]
+        for name, column in sensitivities(problem, z).items()
+    }
 
 
-def _degrees_of_freedom(
-    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
-) -> dict[Quantity, float]:
+def _degrees_of_freedom(problem: Problem, z: Samples, spread: Spread) -> dict[Quantity, float]:
     """Degrees of freedom that the fit leaves each quantity: its means less its share in fitting the numbers."""
-    rows = weighted_sensitivities(problem, z, error, discrepancy)
+    rows = weighted_sensitivities(problem, z, spread)
     # As if the errors were a per cent: what not even that sees takes nothing away.
-    sizes = [max(np.nan_to_num(error[name]), LEAST_ERROR) + discrepancy[name] for name in problem.quantities]
+    sizes = [max(np.nan_to_num(spread.error[name]), LEAST_ERROR) + spread.discrepancy[name] for name in rows]
     sharp = float(np.mean(sizes)) / _SHARP
     whole = sharp * np.concatenate(list(rows.values()))
     inverse = np.linalg.inv(whole.T @ whole + np.eye(z.size))

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.data_tables import rows_of
-from spirillum.envelope import interval
+from spirillum.envelope import interval, quantity
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.model_options import CALIBRATED
@@ -234,10 +235,9 @@ class Estimate:
     """A number with its 95 % interval, SI; NaN where the method gives none."""
 
     value: float
-    low: float
-    high: float
+    low: float = nan
+    high: float = nan
 
-    @property
-    def interval(self) -> dict[str, Any]:
-        """Its interval in JSON."""
-        return interval(self.low, self.high, LEVEL)
+    def quantity(self, unit: str, **more: Any) -> dict[str, Any]:
+        """The number with its interval in JSON, and `more` of it."""
+        return quantity(self.value, unit or "1", **interval(self.low, self.high, LEVEL), **more)

@@ -163,14 +163,14 @@ class Problem:
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor", scaled: Draws | None = None) -> Samples:
         """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
         seen = self.experiment
-        own = {name: factor * self._shared_constant(name) for name, factor in (scaled or {}).items()}
+        constants = {"viscosity": self.forward.viscosity}
+        own = {
+            name: factor * (constants[name] if name in constants else getattr(self.forward.electrics, name))
+            for name, factor in (scaled or {}).items()
+        }
         with np.errstate(invalid="ignore"):
             share = seen.tail_rate / seen.motor_rate.mean
             return self.forward.friction({**self.draws(z), **own}, motor_rate, share, reading)
-
-    def _shared_constant(self, name: str) -> Samples:
-        """A constant of the robots' fluid or motor, SI, (robots,) or (1,)."""
-        return self.forward.viscosity if name == "viscosity" else getattr(self.forward.electrics, name)
 
     def printed_turning(self, z: Samples) -> Samples:
         """Omega/omega of every robot by (19) as printed, at its observed motor rate, (draws, robots)."""

@@ -20,7 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, inertia_warnings, synthetic_warning
-from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, free_names
+from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, free_names, listed_names
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.problem import UnexplainedError
 from spirillum.display import DisplayMixin, counted
@@ -46,11 +46,6 @@ _FREE = "body_drag,body_rotation"
 _FREE_IN_TUBE = "gap,pitch"
 _FREE_IN_TRIAL = "friction_coefficient,roughness"
 """Two numbers for each channel in every model: else one would be praised for its freedom in what another was denied."""
-
-
-def _size(row: dict[str, Any]) -> float:
-    """Largest misfit first."""
-    return -abs(float(row["standard_deviations"]["value"]))
 
 
 @dataclass(frozen=True)
@@ -121,7 +116,7 @@ class Ranking(DisplayMixin):
     def failures(self, item: ModelRank) -> list[dict[str, Any]]:
         """Where a model fails: robots with the largest misfit, relative to what the fit expects of a robot."""
         experiment = item.fit.experiment
-        found = []
+        found: list[dict[str, Any]] = []
         for name, (values, low, high) in item.fit.predicted.items():
             seen = item.fit.problem.ratio(name).mean
             spread = np.abs(high - low) / (2.0 * 1.96)
@@ -136,7 +131,7 @@ class Ranking(DisplayMixin):
                 for place in range(experiment.size)
                 if np.isfinite(off[place])
             ]
-        return sorted(found, key=_size)[:_WORST]
+        return sorted(found, key=lambda row: -abs(row["standard_deviations"]["value"]))[:_WORST]
 
     def _known(self, standard_error: float) -> float | None:
         """A standard error over the robots; None where there are too few of them."""
@@ -153,10 +148,7 @@ class Ranking(DisplayMixin):
                 "largest_pareto_k": quantity(float(item.pareto.max()), "1"),
                 "discrepancy": {name: quantity(v.value, "1") for name, v in item.fit.discrepancy.items()},
                 "parameters": {
-                    c.label: quantity(
-                        item.fit.values[c.label].value, c.parameter.unit or "1", **item.fit.values[c.label].interval
-                    )
-                    for c in item.fit.problem.coordinates
+                    c.label: item.fit.values[c.label].quantity(c.parameter.unit) for c in item.fit.problem.coordinates
                 },
                 "fails_most_at": self.failures(item),
             }
@@ -228,8 +220,7 @@ def rank_models(
             )
         except UnexplainedError as error:
             failed.append(error)
-            words = f"{name} is not ranked, it does not explain the observations: {str(error).partition(';')[0]}"
-            said.append(Note("without-answer", words))
+            said.append(Note.named("model-not-ranked", model=name, why=str(error).partition(";")[0]))
     if not fits:
         raise failed[0]
     found = ranked_fits(fits)
@@ -257,7 +248,7 @@ def free_by_model(
 
 def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
     """Refuse models that have no common set of free numbers: the freer one would win by its freedom."""
-    listed = [name.strip() for name in (free.split(",") if isinstance(free, str) else free)]
+    listed = listed_names(free)
     for model in models:
         lacking = [name for name in listed if name in PARAMETERS and model not in PARAMETERS[name].models]
         if lacking and model in DEFAULT_FREE:
@@ -305,25 +296,18 @@ def _cautions(ranked: Sequence[ModelRank]) -> list[Note]:
     for item in ranked:
         bad = int(np.count_nonzero(item.pareto > _PARETO))
         if bad:
-            words = (
-                f"{item.model}: {bad} of {item.pareto.size} robots cannot be left out by importance sampling (Pareto k "
-                f"above {_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
-            )
-            said.append(Note("intervals-incomplete", words))
+            which = "it decides" if bad == 1 else "each of them decides"
+            of = {"bad": bad, "robots": item.pareto.size, "limit": _PARETO}
+            said.append(Note.named("robots-decide", model=item.model, which=which, **of))
         unusable = (note for note in item.fit.warnings if note.code == "posterior-unusable")
         said += [note.prefixed(f"{item.model}: ") for note in unusable]
     if all(RATES_IN_RADIANS in item.fit.warnings for item in ranked):
         said.append(RATES_IN_RADIANS)
     count = ranked[0].fit.experiment.size
     if count < _FEWEST_ROBOTS:
-        words = (
-            f"only {counted(count, 'robot')}: standard errors of the log density are chance below {_FEWEST_ROBOTS}, "
-            "and not given; measure more tails"
-        )
-        said.append(Note("intervals-incomplete", words))
+        said.append(Note.named("too-few-to-rank", robots=counted(count, "robot"), fewest=_FEWEST_ROBOTS))
     elif count < _MANY_ROBOTS:
-        words = f"only {count} robots: differences of the log density are hardly known; measure more tails"
-        said.append(Note("intervals-incomplete", words))
+        said.append(Note.named("few-to-rank", count=count))
     said += inertia_warnings(ranked[0].fit.experiment)
     if ranked[0].fit.experiment.synthetic:
         said.append(synthetic_warning(ranked[0].fit.experiment.source))

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.experiment import channel_of, tail_words, with_tail
+from spirillum.calibration.experiment import channel_of, robots_by_channel, tail_words, with_tail
 from spirillum.calibration.fit import RobotSource, load_robots
 from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.display import DisplayMixin, counted
@@ -49,7 +49,6 @@ from spirillum.swimming.preparation import fitted_with, has_table
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.scenario import calibration_warnings
 from spirillum.swimming.steady import requirements
-from spirillum.units import show
 
 _WHAT = "a file of candidates (CSV with channel_diameter_mm, wavelength_mm, amplitude_mm)"
 _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
@@ -145,9 +144,13 @@ def suggest(
     check_choice("answer", answer, (HELD, RELEASED))
     known = read_posterior(posterior, answer=answer)
     given = _papers_robots(known) if robots is None else load_robots(robots)
-    _check_channels(given)
+    allowed = "robots with a channel, in which one more tail may be measured"
+    robots_by_channel(given, allowed, "by which candidates are named")
     loaded = [known.central(robot) for robot in given]
-    listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
+    tails = product(_DEFAULT_WAVELENGTHS, _DEFAULT_AMPLITUDES)
+    listed = [with_tail(robot, 1e-3 * length, 1e-3 * size) for (length, size), robot in product(tails, loaded)]
+    if candidates is not None:
+        listed = _listed(Path(candidates), loaded)
     found: list[tuple[CandidateRobot, Samples]] = []
     left_out = []
     numbers, names = _numbers(known)
@@ -229,24 +232,6 @@ def _outside(known: PosteriorFile, robot: Robot, answer: str) -> str:
     return outside[0].sentence() if outside else ""
 
 
-def _check_channels(robots: Sequence[Robot]) -> None:
-    """One robot for each channel: candidates are named by channel and tail."""
-    seen: set[float] = set()
-    for robot in robots:
-        if robot.channel is None:
-            raise InputError(
-                f"robot {robot.name} has no channel; allowed: robots with a channel, in which one more tail may be "
-                "measured"
-            )
-        diameter = round(robot.channel.diameter, 9)
-        if diameter in seen:
-            raise InputError(
-                f"channel.diameter = {show(robot.channel.diameter, 'mm')} of two robots, the second {robot.name}; "
-                "allowed: one robot for each channel"
-            )
-        seen.add(diameter)
-
-
 def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[Note]:
     fit, model = fit_of_posterior(known), find_swimmer_model(known.model)
     said = [
@@ -321,19 +306,8 @@ def _candidate(
     variance = deviations.var(axis=0, ddof=1)
     told = np.einsum("ij,jk,ik->i", shared, np.linalg.inv(spread + errors), shared)
     narrowing = np.sqrt(np.clip(1.0 - told / np.maximum(variance, 1e-300), 0.0, 1.0))
-    candidate = CandidateRobot(
-        channel_of(robot),
-        robot.tail.wavelength,
-        robot.tail.amplitude,
-        gain,
-        {name: float(value) for name, value in zip(names, narrowing, strict=True)},
-    )
-    return candidate, left_out
-
-
-def _default(robots: Sequence[Robot]) -> list[Robot]:
-    tails = product(_DEFAULT_WAVELENGTHS, _DEFAULT_AMPLITUDES)
-    return [with_tail(robot, 1e-3 * w, 1e-3 * a) for (w, a), robot in product(tails, robots)]
+    narrower = dict(zip(names, narrowing.tolist(), strict=True))
+    return CandidateRobot(channel_of(robot), robot.tail.wavelength, robot.tail.amplitude, gain, narrower), left_out
 
 
 def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:

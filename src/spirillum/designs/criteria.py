@@ -229,6 +229,10 @@ class Space:
         """Values of the variables, (designs, variables), from shares of their ranges."""
         return np.stack([variable.at(shares[:, n]) for n, variable in enumerate(self.variables)], axis=-1)
 
+    def named(self, shares: Samples) -> dict[str, float]:
+        """Values of the variables of one design, (variables,), by their fields."""
+        return dict(zip((item.path for item in self.variables), self.values(shares[None])[0].tolist(), strict=True))
+
     def settled(self, shares: Samples) -> Samples:
         """Normalised values, of which those of one whole number coincide."""
         values = self.values(shares)

@@ -155,7 +155,7 @@ def _objectives(maximise: str | Sequence[str], minimise: str | Sequence[str], op
 
 def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -> str:
     """Why no design will do, for the one that comes nearest."""
-    values = _named(searched.space, shares)
+    values = searched.space.named(shares)
     outside = broken(searched.limits(shares[None]))
     if outside:
         why = outside[0].sentence()
@@ -180,11 +180,6 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
         f"motion, {archive.breaking} break a condition); the nearest, {words}: {why}; allowed: wider ranges or looser "
         "conditions"
     )
-
-
-def _named(space: Space, shares: Samples) -> dict[str, float]:
-    values = space.values(shares[None])[0]
-    return {variable.path: float(value) for variable, value in zip(space.variables, values, strict=True)}
 
 
 def _answer(
@@ -227,7 +222,7 @@ def _answer(
         model=searched.model.name,
         objectives=searched.objectives,
         conditions=tuple(item.words for item in searched.conditions),
-        values=_named(space, best),
+        values=space.named(best),
         units={variable.path: variable.unit for variable in space.variables},
         objective=value,
         quantities=quantities,
@@ -287,7 +282,7 @@ def _alternative(
     buildable = all_hold(stated.limits(None if shares is None else shares[None]))
     return Alternative(
         name,
-        _named(space, shares) if shares is not None else space.today,
+        space.named(shares) if shares is not None else space.today,
         float(objective.of(values[None])[0]),
         *share,
         keeps=bool(np.all(buildable)) and float(stated.broken(motion)[0]) <= 0,

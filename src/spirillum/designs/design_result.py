@@ -144,7 +144,7 @@ class Design(DisplayMixin):
             **({"model_reason": self.model_reason} if self.model_reason else {}),
             "objective": {"words": first.words, **quantity(self.objective, unit)},
             "conditions": list(self.conditions),
-            "design": {path: quantity(value, self.units[path]) for path, value in self.values.items()},
+            "design": self._fields(self.values),
             "winding": {name: quantity(value, "1" if name == "turns" else "m") for name, value in self.winding.items()},
             "bound_by": list(self.bound_by),
             "quantities": {
@@ -153,7 +153,7 @@ class Design(DisplayMixin):
             "alternatives": [
                 {
                     "name": other.name,
-                    "design": {path: quantity(value, self.units[path]) for path, value in other.values.items()},
+                    "design": self._fields(other.values),
                     "objective": quantity(other.objective, unit),
                     "keeps_conditions": other.keeps,
                     "probability_that_the_design_is_better": quantity(
@@ -174,9 +174,20 @@ class Design(DisplayMixin):
             "designs": {"swum": self.swum, "refused": self.refused, "breaking_a_condition": self.breaking},
         }
         if self.confirmed:
-            content["confirmed"] = [self._confirmed(one) for one in self.confirmed]
+            content["confirmed"] = [
+                {
+                    "design": self._fields(self.searched.space.named(one.shares)),
+                    "held": {"forward_velocity": quantity(one.held, "m/s")},
+                    "trial": one.trial.to_dict(),
+                }
+                for one in self.confirmed
+            ]
         if self.uncertainty is not None:
-            content["uncertainty"] = self._uncertainty(self.uncertainty)
+            known = self.uncertainty
+            content["uncertainty"] = {"draws": known.draws, "deciding": dict(known.deciding)}
+            if known.probability is not None:
+                share, low, high = known.probability
+                content["uncertainty"]["probability"] = quantity(share, "1", **interval(low, high, LEVEL))
         if self.learned is not None:
             content["learned"] = {
                 "solves": self.learned.solves,
@@ -188,25 +199,13 @@ class Design(DisplayMixin):
             content["front"] = {name: quantity(column, units[name]) for name, column in self.front.items()}
         return envelope("design", content, self.warnings)
 
-    def _confirmed(self, one: ConfirmedDesign) -> dict[str, Any]:
-        space = self.searched.space
-        values = zip(space.variables, space.values(one.shares[None])[0], strict=True)
-        return {
-            "design": {item.path: quantity(float(value), item.unit) for item, value in values},
-            "held": {"forward_velocity": quantity(one.held, "m/s")},
-            "trial": one.trial.to_dict(),
-        }
+    def _fields(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Values of the fields that are varied, with their units."""
+        return {path: quantity(value, self.units[path]) for path, value in values.items()}
 
     def _ends(self, name: str) -> dict[str, Any]:
         known = self.uncertainty
         return {} if known is None or name not in known.low else interval(known.low[name], known.high[name], LEVEL)
-
-    def _uncertainty(self, known: Uncertainty) -> dict[str, Any]:
-        found: dict[str, Any] = {"draws": known.draws, "deciding": dict(known.deciding)}
-        if known.probability is not None:
-            share, low, high = known.probability
-            found["probability"] = quantity(share, "1", **interval(low, high, LEVEL))
-        return found
 
 
 _PROFILE_POINTS = 41

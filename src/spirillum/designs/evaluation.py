@@ -178,14 +178,11 @@ class Evaluation:
 
     def motion(self, shares: Samples | None) -> Swimming:
         """Every design under every draw, the draws of one design one after the other; None: the robot as it is."""
-        if shares is None:
-            return self._swim(self.samples.batch)
-        designs, draws = len(shares), self.samples.number
-        batch = self.samples.batch.taken(np.tile(np.arange(self.samples.batch.size), designs))
-        columns = {path: np.repeat(column, draws) for path, column in self.space.columns(shares).items()}
-        return self._swim(batch.with_values(columns))
-
-    def _swim(self, batch: RobotBatch) -> Swimming:
+        batch = self.samples.batch
+        if shares is not None:
+            draws = self.samples.number
+            columns = {path: np.repeat(column, draws) for path, column in self.space.columns(shares).items()}
+            batch = batch.taken(np.tile(np.arange(batch.size), len(shares))).with_values(columns)
         return swim(batch, self.model, tail_rate=None if self.tail_rate is None else np.full(1, self.tail_rate))
 
     def quantity(self, motion: Swimming, name: str) -> Samples:

@@ -10,7 +10,7 @@ not change C: what is not known of them costs no solve.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -195,26 +195,18 @@ def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callabl
 
 
 def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
-    """Whether a search learns the flow of a model: always with walls, else where the fields allow it.
-
-    A model in closed form is evaluated itself.
-    """
-    if model.closed_form:
+    """Whether a search learns the flow of a model: always with walls, else where the fields allow it."""
+    if model.closed_form:  # it is evaluated itself
         return False
     own, strange = _flow_fields(space)
     return model.placed or not unknowns.known or (not strange and len(own) <= _MOST_FIELDS)
 
 
-def _changing_the_flow(space: Space, unknowns: Unknowns) -> tuple[tuple[Variable, ...], list[str]]:
+def _flow_fields(space: Space, unknown: Sequence[Variable] = ()) -> tuple[tuple[Variable, ...], list[str]]:
     """Fields that are varied and change the flow; names of those, varied or unknown, of which it cannot be learned."""
-    own, strange = _flow_fields(space)
-    return own, strange + [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
-
-
-def _flow_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
-    """Fields that are varied and change the flow; names of those of which it cannot be learned."""
     own = tuple(item for item in space.variables if not item.path.startswith(_FREE))
-    return own, [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
+    strange = [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
+    return own, strange + [item.path for item in unknown if not item.path.startswith(_FREE)]
 
 
 def chosen_model(requested: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
@@ -222,7 +214,7 @@ def chosen_model(requested: str, robot: Robot, space: Space, unknowns: Unknowns)
     choice = choose_model(requested, robot, fit=unknowns.fit)
     if requested != AUTO or unknowns.posterior is not None:
         return choice
-    own, strange = _changing_the_flow(space, unknowns)
+    own, strange = _flow_fields(space, unknowns.ranges)
     if not strange and len(own) <= _MOST_FIELDS:
         return choice
     what = f"{strange[0]} is no field of the tail" if strange else f"{len(own)} fields of the tail are varied"
@@ -236,7 +228,7 @@ def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variab
     """Fields of the tail that are varied, of which the flow has to be learned."""
     if unknowns.posterior is not None:
         raise InputError(f"model = '{name}' with a posterior; allowed: sbt or rft with it, or ranges (unknown)")
-    own, strange = _changing_the_flow(space, unknowns)
+    own, strange = _flow_fields(space, unknowns.ranges)
     if strange:
         raise InputError(
             f"{strange[0]} with model = '{name}', which learns the flow around tails; allowed: to vary "

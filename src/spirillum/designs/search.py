@@ -148,11 +148,9 @@ def best_design(
 def pareto_front(
     evaluation: Evaluation, archive: Archive, *, seed: int, points: int, progress: Progress | None
 ) -> Samples:
-    """Designs of which none is better in both objectives, (points, variables), from one extreme to the other.
-
-    The best of the first objective is sought with the second bounded (epsilon-constraint method, Haimes et al. 1971),
-    for bounds that lie evenly between the extremes. Each search begins where all before it have been.
-    """
+    """Designs of which none is better in both objectives, (points, variables), from one extreme to the other."""
+    # The best of the first objective is sought with the second bounded (epsilon-constraint method, Haimes et al. 1971),
+    # for bounds that lie evenly between the extremes. Each search begins where all before it have been.
     tell(progress, "designs on the front", 0, points)
     ends = [best_design(evaluation, archive, seed=seed, objective=n) for n in (0, 1)]
     if not all(end.possible for end in ends):
@@ -163,11 +161,11 @@ def pareto_front(
         tell(progress, "designs on the front", number, points)
         bound = float(costs[0] + (costs[1] - costs[0]) * number / (points - 1))
         shares, values = archive.all()
-        signs = [1.0 if item.target is not None else item.sign for item in evaluation.objectives]
-        keeps = np.flatnonzero(-signs[1] * values[1] <= bound)
+        first, second = (item.direction for item in evaluation.objectives)
+        keeps = np.flatnonzero(-second * values[1] <= bound)
         members = max(_FEWEST, _POPULATION * evaluation.space.size)
         rng = np.random.default_rng(len(shares))
-        best = keeps[np.argsort(-signs[0] * values[0, keeps], kind="stable")][: members // 2]
+        best = keeps[np.argsort(-first * values[0, keeps], kind="stable")][: members // 2]
         anywhere = rng.random((members - len(best), evaluation.space.size))
         start = np.concatenate([shares[best], anywhere])
         one = best_design(evaluation, archive, seed=seed + number, above=(1, bound), start=start)
@@ -203,8 +201,7 @@ class ConfirmedDesign:
 def best_apart(searched: Evaluation, archive: Archive, best: Samples, count: int) -> list[Samples]:
     """Return the best designs, the best of all first, each of which differs from those before by a tenth of a range."""
     shares, values = archive.all()
-    objective = searched.objectives[0]
-    worth = values[0] * (1.0 if objective.target is not None else objective.sign)
+    worth = values[0] * searched.objectives[0].direction
     worth = np.where(np.isfinite(worth), worth, -np.inf)
     found = [best]
     while len(found) < count:
