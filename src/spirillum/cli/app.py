@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from spirillum.cli import renderer
 from spirillum.cli.calibrate_commands import calibrate, design, rank_models, suggest
 from spirillum.cli.control_commands import control, remote
 from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
@@ -88,7 +89,6 @@ def predict(request: Request, *, plot: Path | None = None, all_of_it: All = Fals
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
-    from spirillum.cli import renderer
     from spirillum.kernels.native import run_together
     from spirillum.papers.biorob2012.published import other_tube, published_values
 
@@ -125,8 +125,6 @@ def compare_models(
 
     Example: `spirillum compare-models biorob2012-wide --tail-rate 1.2Hz`
     """
-    from spirillum.cli import renderer
-
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
     named = request.typed.get("models") or ["sbt", "slender"]
     states = [*(["calibrated"] if calibrated else []), *([] if {"sbt", "slender"} <= {*named} else ["no effects"])]
@@ -153,8 +151,6 @@ def resistance(request: Request, *, json: Json = False) -> None:
 
     Example: `spirillum resistance biorob2012-wide --part tail --about tail-root`
     """
-    from spirillum.cli import renderer
-
     tilted = "placement.yaw" in request.typed
     with renderer.patience(request.typed.get("model", "rft"), quiet=json, tilted=tilted):
         result = request()
@@ -184,8 +180,6 @@ def study(
 
     Example: `spirillum study -o my-study`
     """
-    from spirillum.cli import renderer
-
     drawn = request.typed.get("figures", True)
     refuse_conflicts(context, *(["store"] if store else []), *([] if drawn else ["no figures"]), rows=rows)
     with renderer.progress_bar(quiet=json) as progress:
@@ -238,8 +232,6 @@ def report(request: Request, *, json: Json = False) -> None:
 
     Example: `spirillum report`
     """
-    from spirillum.cli import renderer
-
     renderer.show(request().to_dict(), json=json)
 
 

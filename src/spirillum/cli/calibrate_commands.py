@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from spirillum.calibration.methods import METHODS
+from spirillum.cli import renderer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import loaded_robot, overrides_from, pairs_of, refuse_conflicts
 from spirillum.cli.shared_options import Json, Settings, choices, complete_robots
@@ -128,7 +129,6 @@ def rank_models(
     from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import free_by_model
-    from spirillum.cli import renderer
     from spirillum.robot.arguments import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
     from spirillum.swimming.released_motion import HELD, RELEASED
@@ -160,7 +160,6 @@ def suggest(
     Example: `spirillum suggest my-calibration/posterior.nc --candidates tails.csv`
     """
     from spirillum.calibration.parameters import OBSERVED
-    from spirillum.cli import renderer
     from spirillum.robot.arguments import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
 
@@ -191,7 +190,6 @@ def design(
 
     Example: `spirillum design biorob2012-wide --vary tail.wavelength=5mm:40mm --maximise forward_velocity`
     """
-    from spirillum.cli import renderer
     from spirillum.files import PICTURES, atomic_write_all, guard_inputs, output_target
     from spirillum.robot.robot import robot_text
 

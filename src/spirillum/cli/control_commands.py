@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from spirillum.cli import renderer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
@@ -68,7 +69,6 @@ def control(
 
     Example: `spirillum control biorob2012-wide --task stop-at --at 5mm -o run.nc --plot run.png`
     """
-    from spirillum.cli import renderer
     from spirillum.files import guard_inputs, netcdf_target, write_dataset
 
     target = None if output is None else netcdf_target(output)
@@ -127,6 +127,4 @@ def remote(request: Request, *, port: str, json: Json = False) -> None:
 
     Example: `spirillum remote /dev/ttyUSB0 --duty 0.5 --duration 2s`
     """
-    from spirillum.cli import renderer
-
     renderer.show(request(port).to_dict(), json=json)

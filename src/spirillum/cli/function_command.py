@@ -19,6 +19,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import typer
 
+from spirillum.cli import renderer
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.interrupts import InterruptibleCommand
 from spirillum.cli.shared_options import (
@@ -153,8 +154,6 @@ class Request:
 
     def show(self, *more: Any, json: bool, **others: Any) -> Any:
         """Call the function with a progress bar, print its answer, and return it."""
-        from spirillum.cli import renderer
-
         with renderer.progress_bar(quiet=json) as progress:
             found = self(*more, progress=progress, **others)
         renderer.show(found.to_dict(), json=json)

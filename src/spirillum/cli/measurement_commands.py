@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from spirillum.cli import renderer
 from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import Json, NotedCommand, Settings, choices, optional_robot
@@ -45,8 +46,6 @@ def measure(
 
     Example: `spirillum measure trial-1.mp4 trial-2.mp4 --setup setup.toml -o measured`
     """
-    from spirillum.cli import renderer
-
     if setup is None:
         raise InputError(_NO_SETUP)
     overrides = overrides_from(settings)
@@ -97,7 +96,6 @@ def track(
 
     Example: `spirillum track camera:0 --setup setup.toml --size 640x480 --fps 30`
     """
-    from spirillum.cli import renderer
     from spirillum.live.session import observation_line
     from spirillum.live.streams import line_of
 
@@ -227,7 +225,6 @@ def check_setup(file: Path, film: Path | None = None, json: Json = False) -> Non
 
     Example: `spirillum setup check setup.toml trial-1.mp4`
     """
-    from spirillum.cli import renderer
     from spirillum.measurement.setup_template import setup_answer
 
     renderer.show(setup_answer(file, film), json=json)
@@ -256,7 +253,6 @@ def check_observations(file: Path, json: Json = False) -> None:
 
     Example: `spirillum observations check observations.csv`
     """
-    from spirillum.cli import renderer
     from spirillum.measurement.observations import observations_answer
 
     renderer.show(observations_answer(file), json=json)

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from spirillum.cli import renderer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import time_window
 from spirillum.cli.shared_options import NO_FORM, NO_START, Json, complete_models
@@ -48,7 +49,6 @@ def simulate(
 
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
-    from spirillum.cli import renderer
     from spirillum.dynamics.integration import INTERRUPTED
     from spirillum.dynamics.run_summary import run_answer
     from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
@@ -138,7 +138,6 @@ def magnetic_sweep(request: Request, *, output: Path, plot: Path | None = None, 
 
     Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
     """
-    from spirillum.cli import renderer
     from spirillum.dynamics.run_summary import sweep_answer
     from spirillum.files import netcdf_target, write_dataset
 
@@ -159,8 +158,6 @@ def settle(request: Request, *, output: Path | None = None, json: Json = False) 
 
     Example: `spirillum settle biorob2012-wide --gap 0.5mm --roughness 20um`
     """
-    from spirillum.cli import renderer
-
     draw = renderer.picture(output, "settling.png", "spirillum.view.figures.release:settling_figure")
     with renderer.progress_bar(quiet=json) as progress:
         found = request(progress=progress)

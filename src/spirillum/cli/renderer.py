@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from importlib import import_module
 from pathlib import Path
 from threading import Timer
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
@@ -18,12 +18,11 @@ from rich.text import Text
 
 from spirillum.cli.progress import StagePace, duration, line_after, progress_lines
 from spirillum.cli.shared_options import every_note
-from spirillum.cli.tables import blocks_of
-from spirillum.cli.tables.parts import Answer, Block, Detail
 from spirillum.cli.wrapping import NARROWEST, wrapped
-from spirillum.display import counted
-from spirillum.envelope import as_json, with_notes_last
 from spirillum.notes import Note, headline_cautions, notes_in_answer
+
+if TYPE_CHECKING:
+    from spirillum.cli.tables.parts import Answer, Block
 
 
 class _PipedConsole(Console):
@@ -36,6 +35,10 @@ class _PipedConsole(Console):
 
 def show(answer: Answer, *, json: bool, **options: Any) -> None:
     """Print an answer as JSON, or as title, cautions, tables and the number of its notes, which `--notes` prints."""
+    from spirillum.cli.tables import blocks_of  # brings the models
+    from spirillum.cli.tables.parts import Detail
+    from spirillum.envelope import as_json
+
     if json:
         try:
             typer.echo(as_json(answer))
@@ -62,6 +65,8 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
 
 def _left_line(notes: Sequence[Note], shown: Sequence[Note]) -> str:
     """Return the last line of an answer: codes of cautions that are not shown, and how to read all notes."""
+    from spirillum.display import counted
+
     above = {note.code for note in shown}
     others = dict.fromkeys(note.code for note in notes if note.severity == "caution" and note.code not in above)
     also = f"{counted(len(others), 'more caution')} ({', '.join(others)}) and " if others else ""
@@ -100,6 +105,8 @@ def _print_note(console: Console, note: Note, code: str = "") -> None:
 
 def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
     """An answer with the files that a command has written for it; its notes stay last."""
+    from spirillum.envelope import with_notes_last
+
     return with_notes_last(answer, **files)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from spirillum.cli import renderer
 from spirillum.cli.function_command import Request, from_function, own_options
 from spirillum.cli.inputs import loaded_robot, overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
@@ -43,7 +44,6 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
 
     Example: `spirillum robot show biorob2012-narrow`
     """
-    from spirillum.cli import renderer
     from spirillum.robot.load import robot_answer
 
     renderer.show(robot_answer(loaded_robot(robot, settings)), json=json)
@@ -55,7 +55,6 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
 
     Example: `spirillum robot check biorob2012-wide`
     """
-    from spirillum.cli import renderer
     from spirillum.envelope import envelope
     from spirillum.robot.load import checked
     from spirillum.swimming.preparation import models_without_answer
@@ -86,7 +85,6 @@ def prepare(
 
     Example: `spirillum prepare biorob2012-wide`
     """
-    from spirillum.cli import renderer
     from spirillum.papers.studies import study_of
     from spirillum.studies.study_loader import load_study
     from spirillum.swimming.preparation import preparations_answer, prepare_all
@@ -138,8 +136,6 @@ def export(
 
     Example: `spirillum export biorob2012-wide robot.stl`
     """
-    from spirillum.cli import renderer
-
     if target.suffix.lower() == ".mcap":
         from spirillum.exports.recording import export_run
 
@@ -179,7 +175,6 @@ def validate(
 
     Example: `spirillum validate rodenborn2013`
     """
-    from spirillum.cli import renderer
     from spirillum.results.validation import validate as answer
 
     with renderer.progress_bar(quiet=json) as progress:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from spirillum.cli import renderer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import refuse_conflicts
 from spirillum.cli.shared_options import NO_FORM, Json, choices, choices_in, optional_robot
@@ -41,8 +42,6 @@ def show(request: Request, *, output: Path | None = None, window: bool = False, 
 
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
     """
-    from spirillum.cli import renderer
-
     target = output if output is not None or window else Path("robot.png")
     with renderer.at_work("drawing the robot", quiet=json):
         found = request(target, window=window)
@@ -63,7 +62,6 @@ def film(
 
     Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
     """
-    from spirillum.cli import renderer
     from spirillum.dynamics.run_file import open_run
     from spirillum.files import output_target
     from spirillum.view.scene3d.film import film as answer
@@ -105,7 +103,6 @@ def flow(
 
     Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
     """
-    from spirillum.cli import renderer
     from spirillum.fields.flow import find_tube_pose, flow_answer
     from spirillum.fields.grid import box_around, plane_around
     from spirillum.files import guard_inputs

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import starmap
 
 from rich.markup import escape
-from rich.table import Table
 
 from spirillum.calibration.fit_warnings import CALLED
 from spirillum.cli.tables.parts import Answer, Blocks, Detail, grid, reason_of
@@ -17,15 +17,11 @@ def calibration(answer: Answer) -> Blocks:
     """Fitted numbers of `calibrate`."""
     counts = f"{counted(answer['rows'], 'row')} of {counted(answer['robots'], 'robot')}"
     yield f"{answer['observations']}{_synthetic(answer)}: {counts}, model {answer['model']}, method {answer['method']}"
-    rows = grid("", "parameter", "value", "low", "high", "unit")
-    for name, item in answer["parameters"].items():
-        _add(rows, name, item)
-    for name, item in answer["discrepancy"].items():
-        _add(rows, f"model discrepancy, {CALLED[name]}", item)
-    for name, item in answer["error_of_a_trial"].items():
-        if item["value"] is not None:
-            _add(rows, f"error of a trial, {CALLED[name]}", item)
-    yield rows
+    named = dict(answer["parameters"])
+    named |= {f"model discrepancy, {CALLED[name]}": item for name, item in answer["discrepancy"].items()}
+    known = {name: item for name, item in answer["error_of_a_trial"].items() if item["value"] is not None}
+    named |= {f"error of a trial, {CALLED[name]}": item for name, item in known.items()}
+    yield grid("", "parameter", "value", "low", "high", "unit", rows=starmap(_numbers, named.items()))
     if answer["discrepancy"]:
         yield "model discrepancy: by how much the model misses the mean of a tail, as a standard deviation"
     yield from _friction(answer)
@@ -43,7 +39,8 @@ def _synthetic(answer: Answer) -> str:
     return " (synthetic)" if answer["synthetic"] else ""
 
 
-def _add(rows: Table, name: str, item: Answer) -> None:
+def _numbers(name: str, item: Answer) -> tuple[str, ...]:
+    """A fitted number with its interval; shares in per cent."""
     share = name.startswith(("model discrepancy", "error"))
     unit = "%" if share else display_unit(item["value"], item["unit"])
     numbers = []
@@ -51,7 +48,7 @@ def _add(rows: Table, name: str, item: Answer) -> None:
         value = item.get(key)
         factor, shown = (100.0, item["unit"]) if share else (1.0, unit)
         numbers.append("-" if value is None else in_unit(factor * value, item["unit"], shown))
-    rows.add_row(escape(name), *numbers, "" if unit == "1" else unit)
+    return escape(name), *numbers, "" if unit == "1" else unit
 
 
 def _friction(answer: Answer) -> Iterator[str | Detail]:

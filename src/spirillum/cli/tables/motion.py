@@ -14,6 +14,7 @@ from spirillum.cli.tables.parts import (
     Detail,
     answered_columns,
     band_grid,
+    cell,
     columns_grid,
     error_of,
     files_of,
@@ -26,6 +27,7 @@ from spirillum.cli.tables.parts import (
     reason_of,
     released_columns,
     resting_pose,
+    series_rows,
     unsteady,
 )
 from spirillum.display import fitted_words, percent, rows_of, times
@@ -86,14 +88,12 @@ def _compare_with_published(item: Answer) -> str:
     paper = item["published"]
     unit = display_unit(paper["value"], paper["unit"])
     ours = ", ".join(
-        f"{name} {in_unit(own['value'], own['unit'], unit)} {unit} ({times(own['value'] / paper['value'])})"
+        f"{name} {cell(own, unit)} {unit} ({times(own['value'] / paper['value'])})"
         for name, own in item["ours"].items()
         if own["value"] is not None
     )
-    return (
-        f"published ({item['source']}): {item['case']}: {in_unit(paper['value'], paper['unit'], unit)} {unit}; "
-        f"here: {ours}; {item['remark']}"
-    )
+    published = f"published ({item['source']}): {item['case']}: {cell(paper, unit)} {unit}"
+    return f"{published}; here: {ours}; {item['remark']}"
 
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
@@ -139,7 +139,7 @@ def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
         if name == names[0]:
             rows.add_column(f"against\n{reference}", justify="right")
     for item in models:
-        cells = [in_unit(item[name]["value"], item[name]["unit"], _common_unit(models, name)) for name in names]
+        cells = [cell(item[name], _common_unit(models, name)) for name in names]
         against = "" if item["model"] == reference else _difference(item["relative_difference"][names[0]]["value"])
         name = f"{item['model']}*" if item["calibrated"] else str(item["model"])
         rows.add_row(name, cells[0], against, *cells[1:])
@@ -157,7 +157,7 @@ def _trial_row(trial: Answer, models: Sequence[Answer], names: Sequence[str], re
     yield "trial"
     for name in names:
         item = trial.get(name)
-        yield "-" if item is None else in_unit(item["value"], item["unit"], _common_unit(models, name))
+        yield "-" if item is None else cell(item, _common_unit(models, name))
         if name == names[0]:
             yield _difference(trial["forward_velocity"]["value"] / base - 1.0 if base else None)
 
@@ -174,7 +174,7 @@ def _all_quantities(answer: Answer, models: Sequence[Answer]) -> Blocks:
             others.add_column(item["model"], justify="right", no_wrap=True)
     for name in known:
         unit = _common_unit(models, name)
-        cells = [in_unit(item[name]["value"], item[name]["unit"], unit) for item in models]
+        cells = [cell(item[name], unit) for item in models]
         words = name.replace("_", " ")
         values.add_row(words + (f", {unit}" if unit != "1" else ""), *cells)
         apart = [item["relative_difference"][name]["value"] for item in models if item["model"] != reference]
@@ -300,14 +300,11 @@ _SWEPT = {
 def magnetic_sweep(answer: Answer) -> Blocks:
     """Motion over the rates of a rotating field."""
     title = f"{answer['robot']}: rotating field, model {answer['model']}, free motion"
-    rows = grid(title, *(f"{word}, {QUANTITIES[name].display_unit}" for name, word in _SWEPT.items()))
-    columns = [(answer[name], QUANTITIES[name].display_unit) for name in _SWEPT]
-    for index in range(len(answer["field_rate"]["value"])):
-        rows.add_row(*(in_unit(item["value"][index], item["unit"], unit) for item, unit in columns))
-    yield rows
-    step_out = in_unit(answer["step_out_rate"]["value"], "rad/s", "Hz")
+    units = {name: QUANTITIES[name].display_unit for name in _SWEPT}
+    heads = [f"{word}, {units[name]}" for name, word in _SWEPT.items()]
+    yield grid(title, *heads, rows=series_rows(answer, units))
     yield from reason_of(answer)
-    yield f"step-out in axial motion at {step_out} Hz; no lag where the robot slips"
+    yield f"step-out in axial motion at {cell(answer['step_out_rate'], 'Hz')} Hz; no lag where the robot slips"
     yield from files_of(answer, plot="plot", file="sweep")
 
 
@@ -322,16 +319,14 @@ def settling(answer: Answer) -> Blocks:
     yield quantity_grid(f"{answer['robot']}: settling in its tube", steady)
     drainage = answer["drainage_time"]
     if drainage["value"] is not None:
-        gap = in_unit(drainage["until"]["value"], "m", "mm")
+        gap = cell(drainage["until"], "mm")
         yield quantity_grid(f"in transit, as the gap first falls to {gap} mm", answer["passing"])
     if answer["film"]["gap"]["value"]:
-        film = grid("film under it, level")
-        for name in _FILM:
-            shown = QUANTITIES[name].display_unit
-            film.add_column(f"{name.replace('_', ' ')}{f' ({shown})' if shown != '1' else ''}", justify="right")
-        columns = [(answer["film"][name]["value"], QUANTITIES[name]) for name in _FILM]
-        for index in range(len(answer["film"]["gap"]["value"])):
-            film.add_row(*(in_unit(values[index], item.unit, item.display_unit) for values, item in columns))
+        units = {name: QUANTITIES[name].display_unit for name in _FILM}
+        heads = [f"{name.replace('_', ' ')} ({unit})".removesuffix(" (1)") for name, unit in units.items()]
+        film = grid("film under it, level", *heads, rows=series_rows(answer["film"], units))
+        for column in film.columns:
+            column.justify = "right"
         yield film
     yield from reason_of(answer)
     yield from placement_of(answer["placement"], RELEASED)
@@ -434,9 +429,6 @@ def _scores(scores: Answer, unit: str) -> Blocks:
 
 def _interval(item: Answer, unit: str) -> str:
     shown = display_unit(item["value"], unit)
-    value = in_unit(item["value"], unit, shown)
+    value, low, high = (in_unit(item[key], unit, shown) for key in ("value", "low", "high"))
     words = "" if shown == "1" else f" {shown}"
-    if item["low"] is None:
-        return f"{value}{words}"
-    low, high = (in_unit(item[key], unit, shown) for key in ("low", "high"))
-    return f"{value} ({low} to {high}){words}"
+    return f"{value}{words}" if item["low"] is None else f"{value} ({low} to {high}){words}"

@@ -27,13 +27,27 @@ _NUMBERS = ("value", "low", "high", "last 2/3 of run", "drive on", "steady part"
 """Columns of numbers, which are never folded: names are."""
 
 
-def grid(title: str, *columns: str) -> Table:
-    """An empty table in the look of all answers."""
+def grid(title: str, *columns: str, rows: Iterable[Iterable[str]] = ()) -> Table:
+    """A table in the look of all answers, with `rows` of cells."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
     for column in columns:
         number = column in _NUMBERS
         table.add_column(column, justify="right" if number else "left", overflow="fold", no_wrap=number)
+    for cells in rows:
+        table.add_row(*cells)
     return table
+
+
+def series_rows(answer: Answer, units: Mapping[str, str]) -> Iterator[list[str]]:
+    """The values of quantities that have as many of them, side by side in these units."""
+    columns = [(answer[name], unit) for name, unit in units.items()]
+    for values in zip(*(item["value"] for item, _ in columns), strict=True):
+        yield [in_unit(value, item["unit"], unit) for value, (item, unit) in zip(values, columns, strict=True)]
+
+
+def cell(item: Answer, unit: str, key: str = "value") -> str:
+    """A number of a quantity in a unit, without it."""
+    return in_unit(item.get(key), item["unit"], unit)
 
 
 def friendly(value: float | None, unit: str) -> tuple[str, str]:
@@ -49,18 +63,13 @@ def in_words(item: Any) -> str:
 
 def quantity_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None = None) -> Table:
     """A row for each quantity that has a value, or of `only` these: name, value, unit."""
-    table = grid(title, "quantity", "value", "unit")
-    for row in rows_of(items, only):
-        table.add_row(row.name, row.value, row.unit)
-    return table
+    return grid(title, "quantity", "value", "unit", rows=((r.name, r.value, r.unit) for r in rows_of(items, only)))
 
 
 def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None = None, of: str = "quantity") -> Table:
     """A row for each quantity that has a value, or of `only` these: name, value, low and high of its band, unit."""
-    table = grid(title, of, "value", "low", "high", "unit")
-    for row in rows_of(items, only):
-        table.add_row(row.name, row.value, row.low or "-", row.high or "-", row.unit)
-    return table
+    rows = ((row.name, row.value, row.low or "-", row.high or "-", row.unit) for row in rows_of(items, only))
+    return grid(title, of, "value", "low", "high", "unit", rows=rows)
 
 
 def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
@@ -73,7 +82,7 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
         table.box, table.padding, table.pad_edge = SIMPLE_HEAVY, (0, 0, 0, 1), False
     for name, row in rows.items():
         released = (answer[column].get(name) for column in columns)
-        cells = ["-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released]
+        cells = ["-" if item is None else cell(item, row.unit or "1") for item in released]
         words = "efficiency" if name == "hydrodynamic_efficiency" else row.name
         label = f"{words}, {row.unit}" if row.unit else words
         table.add_row(label, row.value, *(getattr(row, end) or "-" for end in ends), *cells)
@@ -122,7 +131,7 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
             yield f"no interval of the trial: of {trial['runs']} runs {standing} stand and {lost} have no answer"
         return
     unit = speed_unit(speed["high"], trial.get("tail_rotation_rate", speed)["value"])
-    low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
+    low, high, middle = (cell(speed, unit, key) for key in ("low", "high", "median"))
     parts = sorted(trial["unknowns"], key=lambda one: -float(one["share"]["value"]))
     words = [
         f"{_UNKNOWN.get(one['name'], one['name'].replace('_', ' '))} {percent(one['share']['value'])}" for one in parts
@@ -209,8 +218,7 @@ def _range_words(item: Mapping[str, Any]) -> str:
 def range_words(item: Mapping[str, Any]) -> str:
     """Ends of a band in one unit."""
     unit = display_unit(item["high"], item["unit"])
-    low, high = (in_unit(item[key], item["unit"], unit) for key in ("low", "high"))
-    return f"{low} to {high} {unit}"
+    return f"{cell(item, unit, 'low')} to {cell(item, unit, 'high')} {unit}"
 
 
 def reason_of(answer: Answer) -> Iterator[Detail]:

@@ -9,9 +9,19 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid, reason_of
+from spirillum.cli.tables.parts import (
+    Answer,
+    Blocks,
+    cell,
+    friendly,
+    grid,
+    placement_of,
+    quantity_grid,
+    reason_of,
+    series_rows,
+)
 from spirillum.results.installation import report_lines
-from spirillum.units import for_people, in_unit, shown_in
+from spirillum.units import for_people, shown_in
 
 
 def robot(answer: Answer) -> Blocks:
@@ -82,10 +92,8 @@ def export(answer: Answer) -> Blocks:
         if not answer["parameters"]:
             yield title
             return
-        rows = grid(title, "parameter", "value", "unit")
-        for name, item in answer["parameters"].items():
-            rows.add_row(name, f"{item['value']:.6g}", item["unit"])
-        yield rows
+        rows = ((name, f"{item['value']:.6g}", item["unit"]) for name, item in answer["parameters"].items())
+        yield grid(title, "parameter", "value", "unit", rows=rows)
         yield from reason_of(answer)
     else:
         links = answer["links"].items()
@@ -126,12 +134,9 @@ def preparation(answer: Answer) -> Blocks:
         rows.add_row(name.replace("_", " "), f"{100.0 * level['value']:.2g}", yawed)
     yield rows
     valid = answer["valid"]
-    ranges = grid("where it holds", "gap, level, mm", "pitch up to, deg", "nose down to, deg", "yaw, level, to, deg")
-    units = (("gap", "mm"), ("pitch_up", "deg"), ("pitch_down", "deg"), ("yaw", "deg"))
-    columns = [(valid[name]["value"], unit) for name, unit in units]
-    for index in range(len(valid["gap"]["value"])):
-        ranges.add_row(*(in_unit(values[index], "m" if unit == "mm" else "rad", unit) for values, unit in columns))
-    yield ranges
+    heads = ("gap, level, mm", "pitch up to, deg", "nose down to, deg", "yaw, level, to, deg")
+    units = {"gap": "mm", "pitch_up": "deg", "pitch_down": "deg", "yaw": "deg"}
+    yield grid("where it holds", *heads, rows=series_rows(valid, units))
     yield f"the table has {answer['places']} poses and took {answer['seconds']['value']:.0f} s to compute"
 
 
@@ -140,7 +145,7 @@ def preparations(answer: Answer) -> Blocks:
     names = {"forward_velocity": "speed", "body_rotation_rate": "body rate", "sideways_force": "side force"}
     rows = grid("largest errors of the tables, %", "robot", "tail, mm", "tube, mm", *names.values())
     for one in answer["robots"]:
-        tail = " x ".join(in_unit(one[name]["value"], "m", "mm") for name in ("wavelength", "amplitude"))
+        tail = " x ".join(cell(one[name], "mm") for name in ("wavelength", "amplitude"))
         errors = (f"{100.0 * one['error'][name]['value']:.2g}" for name in names)
-        rows.add_row(one["robot"], tail, in_unit(one["channel_diameter"]["value"], "m", "mm"), *errors)
+        rows.add_row(one["robot"], tail, cell(one["channel_diameter"], "mm"), *errors)
     yield rows

@@ -12,11 +12,13 @@ from spirillum.cli.tables.parts import (
     Blocks,
     Detail,
     band_grid,
+    cell,
     files_of,
     grid,
     in_words,
     quantity_grid,
     reason_of,
+    series_rows,
 )
 from spirillum.designs.design_result import ALTERNATIVES
 from spirillum.display import counted, percent
@@ -108,7 +110,7 @@ def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]
     return [
         (
             RANKED[name].heading(shown) if end == "value" else end,
-            [in_unit(item[name].get(end), own, shown) for item in robots],
+            [cell(item[name], shown, end) for item in robots],
         )
         for end in ("value", *ends)
     ]
@@ -140,25 +142,20 @@ def design(answer: Answer) -> Blocks:
     yield from _basis_of_design(answer)
     if any("reason" not in one["trial"] for one in answer.get("confirmed", ())):
         yield _confirmed(answer["confirmed"])
-    for reason in dict.fromkeys(
-        one["trial"]["reason"] for one in answer.get("confirmed", ()) if "reason" in one["trial"]
-    ):
-        yield Detail(f"no trial of designs: {reason}")
+    reasons = [one["trial"]["reason"] for one in answer.get("confirmed", ()) if "reason" in one["trial"]]
+    yield from (Detail(f"no trial of designs: {reason}") for reason in dict.fromkeys(reasons))
     if "front" in answer:
         yield _front(answer["front"])
     yield from files_of(answer, file="robot file", picture="picture", stl="body for a printer")
 
 
 def _confirmed(designs: Sequence[Answer]) -> Table:
-    paths = list(designs[0]["design"])
-    units = {
-        path: display_unit(designs[0]["design"][path]["value"], designs[0]["design"][path]["unit"]) for path in paths
-    }
+    units = {path: display_unit(item["value"], item["unit"]) for path, item in designs[0]["design"].items()}
     rows = grid("the best designs", *(f"{path}, {unit}".removesuffix(", 1") for path, unit in units.items()))
     for column in ("held, mm/s", "trial, mm/s"):
         rows.add_column(column, justify="right")
     for one in designs:
-        cells = [in_unit(one["design"][path]["value"], one["design"][path]["unit"], units[path]) for path in paths]
+        cells = [cell(one["design"][path], unit) for path, unit in units.items()]
         speeds = [one[motion].get("forward_velocity", {"value": None})["value"] for motion in ("held", "trial")]
         rows.add_row(*cells, *(in_unit(speed, "m/s", "mm/s") for speed in speeds))
     return rows
@@ -171,8 +168,7 @@ def _best_values(answer: Answer) -> Table:
         unit = display_unit(item["value"], item["unit"])
         ends = answer["sensitivity"][path]["within_one_per_cent"]["value"]
         low, high = (in_unit(end, item["unit"], unit) for end in ends)
-        now = today["design"][path]["value"]
-        value, was = (in_unit(number, item["unit"], unit) for number in (item["value"], now))
+        value, was = cell(item, unit), cell(today["design"][path], unit)
         fields.add_row(escape(path), value, f"{low} to {high}", "" if unit == "1" else unit, was)
     return fields
 
@@ -227,11 +223,7 @@ def _share(item: Answer) -> str:
 def _front(front: Mapping[str, Answer]) -> Table:
     units = {name: display_unit(max(map(abs, item["value"])), item["unit"]) for name, item in front.items()}
     names = [f"{name.replace('_', ' ')}{'' if units[name] == '1' else f' ({units[name]})'}" for name in front]
-    rows = grid("designs of which none is better in both", *names)
-    for row in zip(*(item["value"] for item in front.values()), strict=True):
-        cells = zip(row, front, strict=True)
-        rows.add_row(*(in_unit(value, front[name]["unit"], units[name]) for value, name in cells))
-    return rows
+    return grid("designs of which none is better in both", *names, rows=series_rows(front, units))
 
 
 def validation(answer: Answer) -> Blocks:

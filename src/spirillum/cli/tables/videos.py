@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, Blocks, Detail, grid, quantity_grid, reason_of
+from spirillum.cli.tables.parts import Answer, Blocks, Detail, cell, grid, quantity_grid, reason_of
 from spirillum.display import percent
 from spirillum.measurement.statistics import ShownNumber, rounded_with_ends
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
-from spirillum.units import for_people, in_unit, shown_in
+from spirillum.units import for_people, shown_in
 
 
 def virtual_experiment(answer: Answer) -> Blocks:
@@ -19,12 +19,10 @@ def virtual_experiment(answer: Answer) -> Blocks:
     videos = answer["trials"] * len(answer["robots"])
     yield f"{answer['folder']}: synthetic, {videos} videos{kept}; truth in {answer['observations']}"
     title = f"without the planted spread of {100 * answer['spread']:g} %"
-    rows = grid(title, "robot", "forward velocity (mm/s)", "tail rate (Hz)", "body rate (Hz)")
-    names = {"forward_velocity": "mm/s", "tail_rotation_rate": "Hz", "body_rotation_rate": "Hz"}
-    for robot in answer["robots"]:
-        cells = [in_unit(robot[name]["value"], robot[name]["unit"], unit) for name, unit in names.items()]
-        rows.add_row(escape(robot["robot"]), *cells)
-    yield rows
+    heads = ("robot", "forward velocity (mm/s)", "tail rate (Hz)", "body rate (Hz)")
+    units = {"forward_velocity": "mm/s", "tail_rotation_rate": "Hz", "body_rotation_rate": "Hz"}
+    robots = [(escape(one["robot"]), *(cell(one[name], units[name]) for name in units)) for one in answer["robots"]]
+    yield grid(title, *heads, rows=robots)
     yield from dict.fromkeys(line for robot in answer["robots"] for line in reason_of(robot))
 
 
@@ -57,10 +55,7 @@ def show(answer: Answer) -> Blocks:
 def recording(answer: Answer) -> Blocks:
     """The file, then its topics."""
     yield f"{answer['file']}: a recording for Foxglove, {answer['robot']}, {answer['duration']['value']:.3g} s"
-    rows = grid("topics", "topic", "messages")
-    for topic, count in answer["topics"].items():
-        rows.add_row(topic, str(count))
-    yield rows
+    yield grid("topics", "topic", "messages", rows=((topic, str(count)) for topic, count in answer["topics"].items()))
 
 
 def measurement(answer: Answer) -> Blocks:
@@ -110,11 +105,9 @@ def _numbers(item: Answer) -> ShownNumber:
 
 def feasibility(answer: Answer) -> Blocks:
     """Expected rates, checks and intervals of `measure --feasibility`."""
-    expected = grid(f"{answer['robot']}: expected", "quantity", "value", "unit", "from")
-    for name, item in answer["expected"].items():
-        unit = for_people(item["unit"])
-        expected.add_row(name.replace("_", " "), in_unit(item["value"], item["unit"], unit), unit, item["source"])
-    yield expected
+    expected = [(name, item, for_people(item["unit"])) for name, item in answer["expected"].items()]
+    cells = ((name.replace("_", " "), cell(item, unit), unit, item["source"]) for name, item, unit in expected)
+    yield grid(f"{answer['robot']}: expected", "quantity", "value", "unit", "from", rows=cells)
     yield from (f"{'yes' if check['passed'] else 'NO':<4} {check['sentence']}" for check in answer["checks"])
     if answer["intervals"]:
         span = f"{answer['time_measured']['value']:.4g} s"
@@ -155,10 +148,8 @@ def setup_check(answer: Answer) -> Blocks:
 
 def setup_proposal(answer: Answer) -> Blocks:
     """What `setup propose` found and how sure it is, then what is left to be filled in."""
-    rows = grid(f"{answer['film']}: what it shows", "what", "sure", "seen")
-    for finding in answer["findings"]:
-        rows.add_row(finding["name"].replace("_", " "), finding["confidence"], finding["sentence"])
-    yield rows
+    rows = ((one["name"].replace("_", " "), one["confidence"], one["sentence"]) for one in answer["findings"])
+    yield grid(f"{answer['film']}: what it shows", "what", "sure", "seen", rows=rows)
     if answer["file"] is not None:
         fields = ", ".join(item["field"] for item in answer["to_fill"])
         yield f"{answer['file']}: fill in what you know: {fields}"
@@ -167,10 +158,8 @@ def setup_proposal(answer: Answer) -> Blocks:
 def track(answer: Answer) -> Blocks:
     """Speed and rates over all frames of `track`, and its latency."""
     if "forward_velocity" in answer:
-        rows = grid(f"{answer['source']}: all frames", "quantity", "value", "low", "high", "unit")
-        for name in RATE_NAMES:
-            rows.add_row(name.replace("_", " "), *_numbers(answer[name]))
-        yield rows
+        rows = ((name.replace("_", " "), *_numbers(answer[name])) for name in RATE_NAMES)
+        yield grid(f"{answer['source']}: all frames", "quantity", "value", "low", "high", "unit", rows=rows)
     seen = f"robot seen on {answer['frames_tracked']} of {answer['frames']} frames, {answer['frames_dropped']} dropped"
     latency = answer["latency"]
     if latency["median"]["value"] is not None:
