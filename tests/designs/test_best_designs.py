@@ -235,6 +235,10 @@ def test_a_lead_within_the_error_of_a_learned_model_is_no_lead(unsure: sp.Design
     learned = replace(unsure, model="tube", learned=Learned(20, 1e-3, 2e-2), alternatives=one_per_cent)
     (sentence,) = margin_warnings(learned)
     assert "the runner-up by 1 %, within the error of 2 % of the learned" in sentence
+    stated = replace(learned, learned=Learned(20, 1e-3, 5e-3, 8e-3))  # each of both speeds is within 0.8 %
+    (sentence,) = margin_warnings(stated)
+    assert "within the error of 1.6 % that model 'tube' states of both speeds together" in sentence
+    assert "today's design by 1 % and the runner-up by 1 %" in sentence
     breaking = tuple(replace(item, keeps=False) for item in one_per_cent)
     assert margin_warnings(replace(learned, alternatives=breaking)) == ()
 

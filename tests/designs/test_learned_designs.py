@@ -10,7 +10,7 @@ import spirillum as sp
 from spirillum.cli import main
 from spirillum.designs.criteria import Manufacturability, Variable, quantity_of, space_of
 from spirillum.designs.evaluation import Evaluation, Objective, Unknowns, unknowns_of
-from spirillum.designs.learned import Corrected, Points, chosen_model, learned_best, points_of, solved_at
+from spirillum.designs.learned import Corrected, Points, chosen_model, learned_best, points_of, solved_at, stated_error
 from spirillum.errors import InputError
 from spirillum.fluid.closed.rft import Rft
 from spirillum.robot.batch import RobotBatch
@@ -53,6 +53,17 @@ def test_learned_optimum_is_that_of_the_truth(robot: Robot, monkeypatch: pytest.
     assert known.last < 5e-3
     assert known.solves < 30
     assert np.isfinite(known.left_out)
+
+
+def test_stated_error_of_the_best_design_is_that_of_its_prediction(robot: Robot) -> None:
+    """By the model's own refinement, and by a table where the design has one; friction that is unknown counts not."""
+    space = space_of(robot, {"tail.amplitude": "2 mm:3 mm"})
+    objective = Objective(quantity_of("forward_velocity", "maximise"), 1.0)
+    unknowns = unknowns_of(robot, FRICTION, None, "slender")
+    blank = Evaluation(space, Rft(), (objective,), (), Manufacturability(), unknowns.draws(8, 1), 0.95)
+    for name in ("slender", "tube"):
+        found = stated_error(blank, name, np.array([0.5]))  # its amplitude of 2.5 mm
+        assert found == pytest.approx(sp.predict(robot, model=name, motion="held").error_estimate, rel=1e-6)
 
 
 def test_learned_model_is_exact_where_it_was_solved_for_and_positive_definite_between(robot: Robot) -> None:

@@ -15,6 +15,7 @@ def test_a_study_without_walls_shows_what_tube_answers() -> None:
     alone = sp.predict("biorob2012-wide", motion="held")
     assert float(found["forward_velocity_held"][0]) == pytest.approx(alone.forward_velocity, rel=1e-9)
     assert float(found["tail_rotation_rate_held"][0]) == pytest.approx(alone.tail_rotation_rate, rel=1e-9)
+    assert float(found["error_estimate_held"][0]) == pytest.approx(alone.error_estimate, rel=1e-9)
     assert HELD in ranking_of(found).quantities
     assert ranking_of(found).best[0].quantity == "forward_velocity"
     assert "forward_velocity_held" not in sp.study({**ONE, "models": ["tube"]})
@@ -28,6 +29,7 @@ def test_trials_of_a_study_are_those_of_predict() -> None:
     alone = sp.predict("biorob2012-wide", roughness="20 um", in_tube={"friction_coefficient": 0.05}).trial
     assert alone is not None
     assert float(found[TRIAL][0]) == pytest.approx(alone.values["forward_velocity"], rel=1e-9)
+    assert float(found["error_estimate_trial"][0]) == pytest.approx(alone.error, rel=1e-9)
     assert float(found["gap_trial"][0]) == pytest.approx(alone.values["gap"], rel=1e-9)
     assert found["trial"].attrs["flag_meanings"].split()[int(found["trial"][0])] == "swimming"
     assert "contact assumed, not validated" in str(found.attrs["warnings"])

@@ -60,18 +60,38 @@ def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
     assert "assume asperities of 20 um and a friction coefficient of 0" in let_go.attrs["warnings"]
 
 
-def ranked(*speeds: float) -> StudyRanking:
-    """Three held tails, with these speeds of steady motions as if they had been released."""
+def ranked(*speeds: float, error: float = np.nan) -> StudyRanking:
+    """Three held tails, with these speeds of steady motions as if they had been released, and their stated error."""
     grid = {**LET["grid"], "wavelengths": ["15 mm", "20 mm", "25 mm"]}
     held = sp.study({**LET, "grid": grid, "settled": False})
     values = np.reshape(speeds, (1, 3, 1))
-    return ranking_of(held.assign(forward_velocity_settled=(("channel", "wavelength", "amplitude"), values)))
+    columns = {"forward_velocity_settled": values, "error_estimate_settled": np.full((1, 3, 1), error)}
+    return ranking_of(held.assign({name: (("channel", "wavelength", "amplitude"), of) for name, of in columns.items()}))
+
+
+def test_a_lead_below_the_errors_of_both_robots_is_said_and_drawn() -> None:
+    """Each robot's table has an error of its own: the lead of one on another counts beyond the sum of both."""
+    close = ranked(2.97e-4, 1e-4, 3e-4, error=0.008)
+    words = "by 1 %, within the model's error of 1.6 %"
+    assert close.message == f"fastest once settled: 25 x 2.5 mm, 0.3 mm/s, {words}"
+    assert close.best[0].within == ("15 x 2.5 mm",)
+    assert words in ranking_picture(close).title
+    near, drawn = ranking_picture(close).draw().axes[0].lines, {}
+    for line in near:
+        if line.get_marker() == "o":
+            drawn[tuple(line.get_ydata())] = line.get_markerfacecolor()
+    assert len(set(drawn.values())) == len(drawn) == 3  # the best, one that is not told from it, the last
+    far = ranked(2.9e-4, 1e-4, 3e-4, error=0.008)
+    assert far.message.endswith("by 3.3 %, the model's error is 1.6 %")
+    assert far.best[0].within == ()
+    several = ranked(2.96e-4, 2.98e-4, 3e-4, error=0.008)
+    assert several.message.endswith("within the model's error of 1.6 %, as 1 other is")
 
 
 def test_ranking_orders_by_the_speed_when_let_go() -> None:
     ranking = ranked(2e-4, 1e-4, 3e-4)
     assert [robot.name for robot in ranking.robots] == ["25 x 2.5 mm", "15 x 2.5 mm", "20 x 2.5 mm"]
-    assert ranking.message == "fastest once settled: 25 x 2.5 mm, 0.3 mm/s"
+    assert ranking.message == "fastest once settled: 25 x 2.5 mm, 0.3 mm/s, by 33 % (no error is stated)"
     first = ranking.to_dict()["best"][0]
     assert (first["what"], first["robot"]) == ("fastest once settled", "25 x 2.5 mm")
     assert "Fastest once settled" in ranking_picture(ranking).title

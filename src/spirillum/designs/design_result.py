@@ -70,6 +70,7 @@ class Learned(NamedTuple):
     left_out: float
     """Root mean square error of the objective of the better half of the solved designs, each learned from the others,
     relative."""
+    stated: float = math.nan  #: Relative error that the model states of the best design's speed; NaN for none.
 
 
 @dataclass(frozen=True, repr=False)
@@ -193,6 +194,7 @@ class Design(DisplayMixin):
                 "solves": self.learned.solves,
                 "error_of_the_best": quantity(self.learned.last, "1"),
                 "error_left_out": quantity(self.learned.left_out, "1"),
+                "error_stated": quantity(self.learned.stated, "1"),
             }
         if self.front is not None:
             units = dict(self.units) | {item.name: item.unit for item in self.objectives}
@@ -331,9 +333,12 @@ def _error(answer: Design, other: Alternative) -> tuple[float, str]:
     """The largest relative error that is stated of the objective, and of what it is; 0 where none is stated."""
     objective = answer.objectives[0]
     errors = {}
-    stated = find_swimmer_model(answer.model).known_speed_error
-    if stated is not None and objective.target is None and objective.quantity.name == "forward_velocity":
-        errors[f"that model '{answer.model}' states of a speed"] = stated
+    if objective.target is None and objective.quantity.name == "forward_velocity":
+        stated = find_swimmer_model(answer.model).known_speed_error
+        if stated is not None:
+            errors[f"that model '{answer.model}' states of a speed"] = stated
+        if answer.learned is not None:
+            errors[f"that model '{answer.model}' states of both speeds together"] = 2.0 * answer.learned.stated
     if answer.learned is not None:
         known = answer.learned
         errors["of the learned model at the best design"] = known.last

@@ -20,7 +20,7 @@ import numpy as np
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.designs.criteria import TURNS, Space, Variable
 from spirillum.designs.design_result import Learned
-from spirillum.designs.evaluation import Evaluation, Unknowns
+from spirillum.designs.evaluation import Evaluation, SampledRobots, Unknowns
 from spirillum.designs.search import Archive, SearchResult, best_design
 from spirillum.errors import InputError
 from spirillum.fluid.closed.sbt import Sbt
@@ -34,6 +34,7 @@ from spirillum.robot.limits import Limit, all_hold
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import joined
 from spirillum.swimming.preparation import AUTO, WALLED, ModelChoice, choose_model
+from spirillum.swimming.steady import speed_error
 
 _COLUMNS = {
     "tail.wavelength": "wavelength",
@@ -267,12 +268,20 @@ def learned_best(
         points = _solved(empty, np.stack(more), own, solving, progress, points)
         after = _objective(replace(blank, model=Corrected(name, points)), best.shares)
         last = abs(before / after - 1.0) if after else abs(before - after)
-    return (
-        evaluation,
-        archive,
-        best,
-        Learned(len(points.features), last, _cross_validation_error(evaluation, name, points)),
-    )
+    stated = stated_error(evaluation, name, best.shares) if best.possible else np.nan
+    known = Learned(len(points.features), last, _cross_validation_error(evaluation, name, points), stated)
+    return evaluation, archive, best, known
+
+
+def stated_error(evaluation: Evaluation, name: str, best: Samples) -> float:
+    """Return the error that a model states of the speed of the best design, of its table or its own refinement."""
+    batch = evaluation.space.batch(best[None])
+    model = quickest(find_swimmer_model(name), batch)
+    if not (finer := model.checked_by(batch)):
+        return model.stated_speed_error(batch)
+    alone = replace(evaluation, samples=SampledRobots(RobotBatch.of(evaluation.space.robot), {}, 1))
+    speeds = [replace(alone, model=one).motion(best[None]).forward_velocity for one in (model, *finer)]
+    return float(speed_error(speeds, model.unchecked_error(batch))[0])
 
 
 def _objective(evaluation: Evaluation, shares: Samples) -> float:

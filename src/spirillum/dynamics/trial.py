@@ -114,7 +114,7 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
         "duration": quantity(length, "s"),
         "warnings": [str(note) for note in notes],
     }
-    return ReleasedMotion(values, basis)
+    return ReleasedMotion(values, basis, error=float(run.attrs.get("error_estimate", np.nan)))
 
 
 RUNS = 64  #: Runs over the unknowns: a power of two, at which Sobol' points fill space evenly.
@@ -398,7 +398,7 @@ class TrialRequest:
             values = {item.name: value for item in STEADY if np.isfinite(value := float(getattr(motion, item.name)))}
         self._announce("steady", values.get("forward_velocity"), values.get("tail_rotation_rate"))
         pose = {name: float(getattr(lying, name)) for name in (*_POSE, "contact_force")}
-        return ReleasedMotion({**values, **pose}, basis)
+        return ReleasedMotion({**values, **pose}, basis, error=motion.error_estimate)
 
     @property
     def _length(self) -> float:

@@ -163,14 +163,14 @@ class HeldTask(OneRobot):
 
     placement: Placement
 
-    needed = frozenset(MOVING)
+    needed = frozenset({*MOVING, "error_estimate"})
     followed = f"held, model {WALLED}"
 
     def follow(self, loaded: LoadedStudy, /) -> dict[str, float]:
         """Compute the quantities of a robot within the model's domain."""
         robot = loaded.with_friction(self.robot)
         found = predict(robot, model=WALLED, motion="held", band=False, placement=self.placement)
-        return {name: float(getattr(found, name)) for name in MOVING}
+        return {name: float(getattr(found, name)) for name in self.needed}
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class TrialTask(OneRobot):
     def needed(self) -> Set[str]:
         """Names of the arrays of its answer."""
         ends = {f"{name}_{end}" for name in MOVING for end in ENDS} if self.interval else set()
-        return {*MOVING, *POSE, "state", *ends}
+        return {*MOVING, *POSE, "error_estimate", "state", *ends}
 
     def follow(self, _loaded: LoadedStudy, /) -> dict[str, float]:
         """Compute the quantities of the trial; none without one."""
@@ -203,7 +203,7 @@ class TrialTask(OneRobot):
         ).trial  # fmt: skip
         if trial is None or trial.reason:
             return {}
-        found = {"state": float(TRIAL_STATES.index(trial.basis["state"]))}
+        found = {"state": float(TRIAL_STATES.index(trial.basis["state"])), "error_estimate": trial.error}
         found |= {name: trial.values.get(name, np.nan) for name in (*MOVING, *POSE)}
         for name, over in trial.intervals.items():
             if name in MOVING:
@@ -248,7 +248,7 @@ def column_variables(
         about = attributes(base, meaning=f"{QUANTITIES[base].meaning}, {meaning}", source=source)
         found[f"{base}_{column}{name.removeprefix(base)}"] = (tuple(robots), gathered(answers, name, shape), about)
 
-    for name in MOVING if held else ():
+    for name in (*MOVING, "error_estimate") if held else ():
         add(held, name, "held", "held at its pose", f"model {WALLED}")
     for name in sorted(trials[0][0].needed - {"state"}) if trials else ():
         end = name.rpartition("_")[2]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Values
-from spirillum.display import percent
+from spirillum.display import counted, percent
 from spirillum.envelope import quantity
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.quantities import unit_of
@@ -78,6 +78,7 @@ class RankedRobot(NamedTuple):
     values: Mapping[str, float]
     low: Mapping[str, float]  #: Least values of bands or lower limits of intervals; NaN without one.
     high: Mapping[str, float]
+    error: Mapping[str, float]  #: Stated errors of the model in each of them, relative; NaN where none is stated.
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
@@ -103,8 +104,9 @@ class Best(NamedTuple):
     known: int
     robots: int
     ties: tuple[str, ...] = ()  #: Names of the other robots that have the same value, to rounding.
-    lead: float = np.nan  #: Of a speed: its lead on the next one, over its own; NaN alone, or without a known error.
-    error: float = np.nan  #: Error of the model in that speed, relative.
+    lead: float = np.nan  #: Its lead on the next one, over its own value; NaN where it is alone.
+    error: float = np.nan  #: Stated error of the model between these two, relative; NaN where none is stated.
+    within: tuple[str, ...] = ()  #: Names of the robots that it leads by less than the error between both.
 
     @property
     def alike(self) -> bool:
@@ -118,7 +120,9 @@ class Best(NamedTuple):
         found |= {"robots": self.known, "of_robots": self.robots}
         found |= {"ties": list(self.ties)} if self.ties else {}
         if np.isfinite(self.lead):
-            found |= {"lead": quantity(self.lead, "1"), "model_error": quantity(self.error, "1")}
+            found |= {"lead": quantity(self.lead, "1")}
+        if np.isfinite(self.lead) and np.isfinite(self.error):
+            found |= {"model_error": quantity(self.error, "1"), "within_error": list(self.within)}
         return found | ({"places": self.places, "of_places": self.of_places} if self.of_places else {})
 
 
@@ -144,8 +148,8 @@ class StudyRanking:
         speed, low, high = (of[by] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
-        held = _AT_A_POSE if self.held else ""
-        return f"{RANKED[by].superlative}{held}: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
+        size = f"{in_unit(speed, 'm/s', shown)} {shown}{band}"
+        return best_in_words(next(best for best in self.best if best.quantity == by).to_dict(), size, held=self.held)
 
     @property
     def settled(self) -> bool:
@@ -183,16 +187,28 @@ def best_in_words(best: Mapping[str, Any], size: str = "", *, held: bool = False
     """Return which robot is the best by a quantity, and how surely; `held` is said of the model's own speed."""
     what = f"{best['what']}{_AT_A_POSE if held and best['quantity'] == 'forward_velocity' else ''}"
     if best["alike"]:
-        return f"{what}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
+        alike = f"no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
+        return f"{what}: {', '.join(filter(None, (size, alike)))}"
     sure = f"at {best['places']} of {best['of_places']} poses" if "places" in best else ""
     some = best["robots"] < best["of_robots"]
     among = f"among {best['robots']} of {best['of_robots']} robots, the others have no such value" if some else ""
     ties = best.get("ties", [])
     more = f" and {len(ties) - _NAMED} more" if len(ties) > _NAMED else ""
     equal = f"no better than {'; '.join(ties[:_NAMED])}{more}" if ties else ""
-    lead, error = (best.get(name, {"value": 0.0})["value"] for name in ("lead", "model_error"))
-    within = "" if lead >= error or ties else f"by {percent(lead)}, within the model's error of {percent(error)}"
-    return ", ".join(filter(None, (f"{what}: {best['robot']}", size, within, equal, sure, among)))
+    lead = "" if ties or "lead" not in best else _lead_in_words(best)
+    return ", ".join(filter(None, (f"{what}: {best['robot']}", size, lead, equal, sure, among)))
+
+
+def _lead_in_words(best: Mapping[str, Any]) -> str:
+    """By how much the best robot leads, beside the error of the model between the two."""
+    lead = f"by {percent(best['lead']['value'])}"
+    if "model_error" not in best:
+        return f"{lead} (no error is stated)"
+    within, error = best["within_error"], percent(best["model_error"]["value"])
+    if not within:
+        return f"{lead}, the model's error is {error}"
+    more = f", as {counted(len(within) - 1, 'other')} {'is' if len(within) == 2 else 'are'}" if within[1:] else ""
+    return f"{lead}, within the model's error of {error}{more}"
 
 
 def can_be_ranked(dataset: xr.Dataset) -> bool:
@@ -230,12 +246,15 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     values = {name: _flat(chosen, name, names) for name in known}
     values[known[-1]] = np.abs(values[known[-1]])  # a motor in the other sense of rotation draws no less
     low, high, kind = _ends(chosen, known, names)
+    errors = {name: _stated_errors(chosen, name, len(names))[0] for name in known}
     order = np.argsort(-values["forward_velocity"], kind="stable")
     order = order[np.isfinite(values["forward_velocity"][order])]
     order = order[np.argsort(-values[known[0]][order], kind="stable")]  # NaN last, in their order
     ranked = {
         int(index): RankedRobot(
-            names[index], int(index), *({name: float(of[name][index]) for name in known} for of in (values, low, high))
+            names[index],
+            int(index),
+            *({name: float(of[name][index]) for name in known} for of in (values, low, high, errors)),
         )
         for index in order
     }
@@ -291,33 +310,44 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     spread = float(np.ptp(finite) / max(abs(values[winner]), 1e-300)) if finite.size > 1 else np.inf
     near = np.abs(values[among] - values[winner]) <= _EQUAL * abs(values[winner])
     ties = tuple(ranked[int(place)].name for place in among[near] if place != winner)
-    error = _speed_error(chosen, name, winner)
-    lead = _margin(sign * finite) if np.isfinite(error) else np.nan
-    places = chosen.get(f"{name}_at_place")
-    if places is None:
-        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, ties, lead, error)
+    leads = sign * (values[winner] - values[among]) / max(abs(values[winner]), 1e-300)
+    errors, alike = _stated_errors(chosen, name, values.size)
+    between = errors[among] + (0.0 if alike else errors[winner])
+    others = [n for n in np.argsort(leads, kind="stable") if among[n] != winner and np.isfinite(leads[n])]
+    lead, error = (float(of[others[0]]) if others else np.nan for of in (leads, between))
+    within = tuple(ranked[int(among[n])].name for n in others if leads[n] < between[n])
+    wins, places = _wins(chosen, name, sign * values, winner, among)
+    return Best(word, name, ranked[winner], wins, places, spread, finite.size, among.size, ties, lead, error, within)
+
+
+def _wins(chosen: xr.Dataset, name: str, values: Values, winner: int, among: Values) -> tuple[int, int]:
+    """At how many poses the winner is the best, and the number of poses with all answers; zeros without a band."""
+    if (places := chosen.get(f"{name}_at_place")) is None:
+        return 0, 0
+    sign = RANKED[name].sign
     others = places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
-    there = sign * np.column_stack([values, others])[among]
+    there = np.column_stack([values, sign * others])[among]
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(among[np.argmax(there, axis=0)] == winner)) if there.shape[1] else 0
-    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, ties, lead, error)
+    return wins, there.shape[1]
 
 
-def _margin(values: Values) -> float:
-    """By how much the largest value leads the next one, over its own size."""
-    if values.size < 2:
-        return np.nan
-    second, first = np.sort(values)[-2:]
-    return float((first - second) / max(abs(first), 1e-300))
+_ERRORS = {
+    "forward_velocity": "error_estimate",
+    **{name: name.replace("forward_velocity", "error_estimate") for name in _BESIDE},
+}
+"""Speeds that rank robots, and the variables with their errors."""
 
 
-def _speed_error(chosen: xr.Dataset, name: str, place: int) -> float:
-    """The error of a robot's speed by the model's own estimate, else by its stated one; NaN where none is known."""
-    own = {"forward_velocity": "error_estimate", STEADY_SPEED: "error_estimate_settled"}.get(name)
-    if own is None:
-        return np.nan
-    estimate = np.nan
+def _stated_errors(chosen: xr.Dataset, name: str, robots: int) -> tuple[Values, bool]:
+    """Relative errors of a quantity of all robots, NaN where none is stated; whether it is one error of the model.
+
+    Each robot's own, which are independent, or that which the model states of any robot's speed.
+    """
+    own = _ERRORS.get(name, "")
     if own in chosen and set(chosen[own].dims) == set(robot_dims(chosen)):
-        estimate = float(chosen[own].transpose(*robot_dims(chosen)).values.ravel()[place])
+        found = chosen[own].transpose(*robot_dims(chosen)).values.astype(float).ravel()
+        if np.isfinite(found).any():
+            return found, False
     stated = SWIMMER_MODELS[str(chosen["model"].values)].known_speed_error if name == "forward_velocity" else None
-    return estimate if np.isfinite(estimate) or stated is None else stated
+    return np.full(robots, np.nan if stated is None else stated), True

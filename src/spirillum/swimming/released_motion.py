@@ -46,6 +46,7 @@ class ReleasedMotion:
     """What the motion rests on, and what became of the robot, as entries of its JSON."""
     intervals: Mapping[str, TrialInterval] = field(default_factory=dict)
     """Intervals of the quantities over the unknowns; none where they were not requested."""
+    error: float = math.nan  #: Stated error of the table in the forward velocity, relative; NaN where none is stated.
     reason: str = ""  #: Why there is none, in a sentence; empty where there is one.
 
     def to_dict(self) -> dict[str, Any]:
@@ -56,7 +57,8 @@ class ReleasedMotion:
         values = {
             name: quantity(value, QUANTITIES[name].unit, **over.get(name, {})) for name, value in self.values.items()
         }
-        return {**self.basis, **values}
+        error = {"error_estimate": quantity(self.error, "1")} if math.isfinite(self.error) else {}
+        return {**self.basis, **error, **values}
 
 
 State = Literal["steady", "orbits", "goes around", "changing"]

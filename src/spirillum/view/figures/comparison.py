@@ -17,7 +17,7 @@ from spirillum.arrays import Values
 from spirillum.display import percent
 from spirillum.dynamics.comparison import RELEASED_EFFECT, ModelComparison, estimated_error
 from spirillum.errors import InputError
-from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
+from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, Best, RankedRobot, StudyRanking, unit_of_ranked
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import WALLED
 from spirillum.swimming.released_motion import ASSUMPTION
@@ -37,9 +37,13 @@ from spirillum.view.figures.style import (
 MOST = 12  #: Robots in the figure.
 _ROW, _ENDS = 0.24, 1.2  # inches
 _LINE, _WIDE = 0.19, 68  # height of a line of the title, inches, and the characters that it holds
+_SMALL_LINE = 0.15  # of one below the title
 
 
 _NO_WALLS = "The channel's walls are not computed"
+_ERROR = "error that the model states of a speed"
+_PALE = "pale: less behind it than the errors of both"
+_TINT = "#9cc6e0"  # the blue of the best, half as strong
 
 
 def ranking_picture(ranking: StudyRanking) -> Picture:
@@ -49,18 +53,22 @@ def ranking_picture(ranking: StudyRanking) -> Picture:
     lines = f" Lines: {ENDS[ranking.kind]}." if ranking.kind else ""
     walls = f" {_NO_WALLS}." if ranking.walls else ""
     caption = (
-        f"{which}, by model {ranking.model} with friction model {ranking.friction}; filled: the best of its column."
-        f"{lines}{walls}"
+        f"{which}, by model {ranking.model} with friction model {ranking.friction}; filled: the best of its column, "
+        f"{_PALE}.{lines} Bars with caps: {_ERROR}.{walls}"
     )
     title = ranking.message[:1].upper() + ranking.message[1:]
-    return Picture.of(plain(title, 120), caption, f"{plain(title, 120)}. {which}.", lambda: _drawn(ranking))
+    return Picture.of(plain(title, 160), caption, f"{plain(title, 160)}. {which}.", lambda: _drawn(ranking))
 
 
 def _drawn(ranking: StudyRanking) -> Figure:
     robots = ranking.robots[:MOST]
     names = [name for name in ranking.quantities if any(np.isfinite(robot.values[name]) for robot in robots)]
-    title = fill(plain(ranking.message[:1].upper() + ranking.message[1:], 120), _WIDE)
-    more = _LINE * title.count("\n")
+    title = fill(plain(ranking.message[:1].upper() + ranking.message[1:], 160), _WIDE)
+    by = [f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}." if ranking.walls else "")]
+    by += [f"{SETTLED_BASIS[:1].upper()}{SETTLED_BASIS[1:]}."] if ranking.settled else []
+    if any(np.isfinite(error) for robot in robots for error in robot.error.values()):
+        by.append(f"Bars with caps: {_ERROR}; {_PALE}.")
+    more = _LINE * title.count("\n") + _SMALL_LINE * (len(by) - 1)
     figure = new_figure(PAGE, _ENDS + more + _ROW * len(robots))
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False, width_ratios=[1.6] + [1.0] * (len(names) - 1))
     ticks = 4 if len(names) < 4 else 2
@@ -69,37 +77,41 @@ def _drawn(ranking: StudyRanking) -> Figure:
             panel,
             robots,
             name,
-            {best.quantity: (best.robot.name, *best.ties) for best in ranking.best if not best.alike},
+            next((best for best in ranking.best if best.quantity == name and not best.alike), None),
             ticks,
         )
     first = panels[0][0]
     first.set_yticks(range(len(robots)), distinct_labels([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
     figure.suptitle(title, x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
-    by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}. " if ranking.walls else "")
-    by += f"{SETTLED_BASIS[:1].upper()}{SETTLED_BASIS[1:]}." if ranking.settled else ""
-    figure.text(0.02, 1.0 - (0.32 + more) / figure.get_figheight(), by, ha="left", va="top", size="small")
+    below = (0.32 + _LINE * title.count("\n")) / figure.get_figheight()
+    figure.text(0.02, 1.0 - below, "\n".join(by), ha="left", va="top", size="small")
     figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.14 / figure.get_figheight()))
     return figure
 
 
-def _column(
-    panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, tuple[str, ...]], ticks: int
-) -> None:
-    """One quantity of all robots: points, and lines over their bands."""
-    values, low, high = (
-        np.array([getattr(robot, which)[name] for robot in robots]) for which in ("values", "low", "high")
+def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: Best | None, ticks: int) -> None:
+    """One quantity of all robots: points, lines over their bands, and bars over the model's stated error."""
+    values, low, high, error = (
+        np.array([getattr(robot, which)[name] for robot in robots]) for which in ("values", "low", "high", "error")
     )
-    scale = _scale(np.concatenate([values, high]), unit_of_ranked(name))
+    bar = np.nan_to_num(error) * np.abs(values)
+    scale = _scale(np.concatenate([values + bar, high]), unit_of_ranked(name))
     rows = np.arange(len(robots))
     colour = COLOURS["blue"]
     panel.hlines(rows, scale(low), scale(high), color=colour, linewidth=2.2, alpha=0.35)
-    winner = np.array([robot.name in best.get(name, ()) for robot in robots])
-    for chosen, face in ((winner, colour), (~winner, "white")):
+    first, near = ((), ()) if best is None else ((best.robot.name, *best.ties), best.within)
+    winner, within = (np.array([robot.name in names for robot in robots]) for names in (first, near))
+    within &= ~winner
+    panel.errorbar(
+        scale(values), rows, xerr=np.where(np.isfinite(error), scale(bar), np.nan), fmt="none", ecolor="black",
+        capsize=3, elinewidth=0.8, capthick=0.8,
+    )  # fmt: skip
+    for chosen, face in ((winner, colour), (within, _TINT), (~winner & ~within, "white")):
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
     panel.set_xlabel(RANKED[name].title + ("" if scale.unit == "1" else f" ({scale.unit})"))
     panel.xaxis.set_major_locator(MaxNLocator(ticks))
-    panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))) or 1.0)
+    panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values + bar, high])))) or 1.0)
     panel.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):
         panel.spines[side].set_visible(False)
