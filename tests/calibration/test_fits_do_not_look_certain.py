@@ -1,10 +1,12 @@
 """Little data gives wide intervals, and what cannot be true is refused or named by its row."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.commands import run_command
 
 import spirillum as sp
 from spirillum import InputError
@@ -127,7 +129,7 @@ def test_the_papers_method_says_by_how_much_it_misses(made: Callable[..., Path])
     assert any("misses the body rate by" in warning for warning in found.warnings)
 
 
-def test_trials_that_are_equal_in_every_number_are_named(made: Callable[..., Path], tmp_path: Path) -> None:
+def test_trials_that_are_equal_in_every_number_count_once(made: Callable[..., Path], tmp_path: Path) -> None:
     lines = made(**FOUR, seed=5).read_text().splitlines()
     header = next(line for line in lines if line.startswith("robot"))
     place = header.split(",").index("trial")
@@ -136,8 +138,20 @@ def test_trials_that_are_equal_in_every_number_are_named(made: Callable[..., Pat
     ]
     copied = tmp_path / "copied.csv"
     copied.write_text("\n".join(",".join(row) for row in [*rows, rows[1], rows[1]]) + "\n")
-    said = sp.calibrate(copied, WIDE, method="least-squares", model="sbt").warnings
-    assert any(line.startswith("rows 2, 22, 23 are equal in every number: copies of a trial") for line in said)
+    plain = tmp_path / "plain.csv"
+    plain.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    found, alone = (sp.calibrate(file, WIDE, method="least-squares", model="sbt") for file in (copied, plain))
+    assert any(line.startswith("rows 22, 23: equal to row 2 in every number") for line in found.warnings)
+    assert found.values == alone.values
+    study = {"models": ["sbt"], "friction": ["rotor"], "robots": [WIDE]}
+    vary = {"tail.wavelength": ["15 mm", "25 mm"], "tail.amplitude": ["1.5 mm", "2.5 mm"]}
+    twice, once = (sp.study({**study, "vary": vary}, observations=file) for file in (copied, plain))
+    assert twice["observed_forward_velocity"].equals(once["observed_forward_velocity"])
+    assert twice["observed_forward_velocity_ci95"].equals(once["observed_forward_velocity_ci95"])
+    assert "equal to row 2 in every number" in twice.attrs["warnings"]
+    assert "equal to row" not in once.attrs["warnings"]
+    said = run_command("observations", "check", str(copied)).out
+    assert "rows 22, 23: equal to row 2" in " ".join(said.split())
 
 
 def test_the_mean_of_a_robots_motor_has_the_errors_of_tail_and_body(tmp_path: Path) -> None:
@@ -158,6 +172,19 @@ def test_one_tail_alone_is_not_said_to_be_missed(made: Callable[..., Path]) -> N
         found = sp.calibrate(made(**one, seed=7), WIDE, free=free, method="least-squares", model="sbt")
         assert not any("from tail to tail, beyond" in warning for warning in found.warnings)
         assert any("a typical one is used" in warning for warning in found.warnings)
+
+
+def test_one_tail_far_off_the_fit_is_not_laid_on_the_model(tmp_path: Path) -> None:
+    """A wrong pose or viscosity would look the same: the sentence names both, the table blames neither."""
+    file = tmp_path / "one.csv"
+    rows = [f"40,25,2.5,{trial},0.{speed},1.2,-0.067" for trial, speed in enumerate((2184, 2264, 2175), 1)]
+    names = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
+    file.write_text("\n".join([names, *rows]) + "\n")
+    fast = ["--method", "least-squares", "--no-figures", "-o", str(tmp_path / "fit")]
+    said = " ".join(run_command("calibrate", str(file), WIDE, *fast).out.split())
+    assert re.search(r"the best fit is \d+ % off the speed, and one tail cannot tell whether 'tube' or a fixed", said)
+    assert "one tail cannot tell it from wrong fixed numbers" in said
+    assert "misses the" not in said
 
 
 def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None:

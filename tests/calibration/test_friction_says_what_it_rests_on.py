@@ -52,6 +52,20 @@ def test_answers_say_what_is_taken_as_exact(made: Callable[..., Path], tmp_path:
     assert "effective_friction_statement" not in fitted(path, free="body_drag").to_dict()
 
 
+def test_the_line_with_b_eff_names_what_it_takes_as_exact(made: Callable[..., Path]) -> None:
+    """With how much each moves it, and without what was stated."""
+    path = made(**FOUR, seed=31, friction=TRUTH)
+    found = fitted(path)
+    middle = np.median([item.value for item in found.friction])
+    change = 100 * np.median(found.friction_sensitivity["fluid.viscosity"]) / middle
+    (line,) = (line for line in _friction(found.to_dict()) if line.startswith("B_eff takes as exact: "))
+    assert f"fluid.viscosity (1 % more: {0.01 * change:+.2g} %), motor.torque_constant (1 % more: +" in line
+    stated = dict.fromkeys(("fluid.viscosity", "motor.torque_constant", "motor.back_emf_constant"), "5%")
+    known = list(_friction(fitted(path, assume_uncertainty={"fluid.viscosity": "5%"}).to_dict()))
+    assert any(line.startswith("B_eff takes as exact: motor.torque_constant") for line in known)
+    assert not any("takes as exact" in line for line in _friction(fitted(path, assume_uncertainty=stated).to_dict()))
+
+
 def test_an_interval_that_reaches_below_zero_says_so(made: Callable[..., Path]) -> None:
     found = fitted(made(**FOUR, seed=31, friction=TRUTH))
     sure, unsure = Estimate(TRUTH, 0.9 * TRUTH, 1.1 * TRUTH), Estimate(TRUTH, -TRUTH, 3.0 * TRUTH)

@@ -199,6 +199,7 @@ def test_a_copy_of_a_trial_is_said(make_trial: MakeTrial) -> None:
     copies = [[flag for flag in trial.flags if flag.name == "copy-of-a-trial"] for trial in trials]
     assert [len(flags) for flags in copies] == [0, 0, 1]
     assert "the same as a," in copies[2][0].sentence
+    assert summary_of(trials) == summary_of(trials[:2])
 
 
 def test_tracking_alone_makes_no_wobble(make_trial: MakeTrial) -> None:

@@ -16,7 +16,7 @@ from spirillum.calibration.identifiability import Identifiability
 from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.likelihood import LEAST_RELATIVE
 from spirillum.calibration.methods import Method
-from spirillum.calibration.parameters import Estimate
+from spirillum.calibration.parameters import ASSUMABLE, Estimate
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
 from spirillum.calibration.problem import Problem
 from spirillum.display import DisplayMixin
@@ -77,6 +77,16 @@ class Calibrated(DisplayMixin):
         return self.problem.experiment
 
     @property
+    def friction_exact(self) -> dict[str, float]:
+        """Fields that the intervals of B_eff take as exact, with its relative change per that of each."""
+        if not self.friction_statement:
+            return {}
+        middle = np.nanmedian(np.abs([item.value for item in self.friction]))
+        stated = [field for field, name in ASSUMABLE.items() if name in self.problem.assumed]
+        changes = {field: float(np.nanmedian(by) / middle) for field, by in self.friction_sensitivity.items()}
+        return {field: change for field, change in changes.items() if field not in stated}
+
+    @property
     def converged(self) -> bool:
         """Whether a posterior may be used; True for the other methods."""
         return self.posterior is None or self.posterior.converged
@@ -109,6 +119,7 @@ def _content(found: Calibrated) -> dict[str, Any]:
         "friction": found.reading,
         "parameters": parameters,
         **({"effective_friction_statement": found.friction_statement} if found.friction_statement else {}),
+        "effective_friction_exact": {field: quantity(by, "1") for field, by in found.friction_exact.items()},
         "discrepancy": {name: size.quantity("1") for name, size in found.discrepancy.items()},
         "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
         "tails": [_tail(found, place) for place in range(experiment.size)],

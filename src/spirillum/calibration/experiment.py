@@ -28,6 +28,7 @@ from spirillum.measurement.observations import (
     observation_table,
     read_observations,
     unread_columns,
+    without_copies,
 )
 from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
@@ -105,7 +106,7 @@ class Experiment:
     synthetic: bool  #: Whether the file states that its numbers are synthetic.
     outliers: tuple[Note, ...] = ()  #: Trials that are far off the others of their tail, a sentence each.
     doubts: tuple[Note, ...] = ()
-    """What is doubtful of the rows, such as trials of one tail that are equal in every number, a sentence each."""
+    """What is doubtful of the rows, such as copies of a trial, which do not count, a sentence each."""
 
     @property
     def size(self) -> int:
@@ -138,10 +139,11 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
     """Read observations and lay them onto robots: by channel diameter; the tail is that of the row."""
     path = Path(path)
     observations = read_observations(path)
+    kept, copies = without_copies(observations)
     allowed = "robots with the channels of the observations"
     by_channel = robots_by_channel(robots, allowed, "by which rows are matched")
     groups: dict[tuple[float, float, float], list[ObservationRow]] = {}
-    for item in observations:
+    for item in kept:
         robot = by_channel.get(round(item.channel_diameter, 9))
         if robot is None:
             raise InputError(
@@ -190,7 +192,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         doubts=(
             *unread_columns(table),
             *convention_doubt(all_rates(observations)),
-            *(sentence for group in items for sentence in _copies(group)),
+            *copies,
         ),
         outliers=_outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
@@ -241,15 +243,6 @@ def _check_variety(path: Path, observations: Sequence[ObservationRow]) -> None:
             f"{path}, {rows_in_words(item.row for item in rows)}, column forward_velocity_mm_s: all are "
             f"{1e3 * rows[0].forward_velocity:g}; allowed: measured values, which differ"
         )
-
-
-def _copies(items: Sequence[ObservationRow]) -> list[Note]:
-    """A note on trials of one tail that are equal in every number; none where they differ."""
-    alike: dict[str, list[int]] = {}
-    for item in items:
-        numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate)
-        alike.setdefault(repr(numbers), []).append(item.row)
-    return [Note.named("copied-trials", rows=", ".join(map(str, rows))) for rows in alike.values() if len(rows) > 1]
 
 
 def _check_direction(path: Path, items: Sequence[ObservationRow]) -> None:

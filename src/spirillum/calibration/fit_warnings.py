@@ -112,7 +112,8 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
         misfit = min(size.value, fit.discrepancy[name])  # by the residuals, and not the prior alone
         few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).is_observed) == 1
         if (few or one) and misfit > _BEYOND_TRIALS:
-            found.append(Note.named("factors-miss", share=percent(fit.discrepancy[name]), **words))
+            share, tails = percent(fit.discrepancy[name]), "one tail" if one else "so few"
+            found.append(Note.named("factors-miss", share=share, tails=tails, **words))
         beyond = ""
         if few or one:
             found.append(Note.named("misfit-of-no-rest" if few else "misfit-of-one-tail", **words))

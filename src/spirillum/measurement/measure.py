@@ -41,6 +41,7 @@ from spirillum.vision.track.track import Track
 from spirillum.vision.video.frames import Video
 
 _LENGTHS = ("forward_velocity", "lateral_position")
+_COPY = "copy-of-a-trial"
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Summary:
 
     quantities: Mapping[str, Measured]  #: Means by the names of `MEASURED`.
     counts: Mapping[str, int]  #: Number of trials that entered each mean.
-    trials: int  #: Number of all trials.
+    trials: int  #: Number of all trials, without copies.
     scale_uncertainty: float  #: Relative standard uncertainty of lengths, common to all trials.
 
     def to_dict(self) -> dict[str, Any]:
@@ -59,8 +60,9 @@ class Summary:
 
 
 def summary_of(trials: Sequence[Trial]) -> Summary:
-    """Means over trials with Student's t intervals; that of a single trial is its own."""
+    """Means over trials with Student's t intervals; that of a single trial is its own. A copy of a trial is none."""
     # The uncertainty of the scale is common to all trials: averaging does not reduce it.
+    trials = [trial for trial in trials if not any(flag.name == _COPY for flag in trial.flags)]
     shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
     quantities, counts = {}, {}
     for name in MEASURED:
@@ -106,7 +108,7 @@ def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
     twin = next((other for other in others if np.array_equal(other.track.position[:, 0], x, equal_nan=True)), None)
     if twin is None or not np.isfinite(x).any():
         return trial
-    return trial.flagged(Flag.named("copy-of-a-trial", name=twin.name))
+    return trial.flagged(Flag.named(_COPY, name=twin.name))
 
 
 Progress = Callable[[str, int, int], None]
@@ -140,7 +142,7 @@ class Measurement(DisplayMixin):
             Note("not-measured", f"the mean {name.replace('_', ' ')} rests on {count} of {total} trials", (name,))
             for name, count in few.items()
         ]
-        if len(self.trials) == 1:
+        if self.summary.trials == 1:
             words = "one trial: intervals are its own and do not include how trials differ; measure more trials"
             found.append(Note("intervals-incomplete", words))
         two = [name for name in RATE_NAMES if self.summary.counts.get(name) == 2]

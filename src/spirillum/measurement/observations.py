@@ -227,6 +227,20 @@ def check_driven(path: str | Path, observations: Sequence[ObservationRow], robot
     check_signs(path, observations, ("tail_rate_Hz", "motor_rate_Hz"), sense, allowed)
 
 
+def without_copies(observations: Iterable[ObservationRow]) -> tuple[list[ObservationRow], tuple[Note, ...]]:
+    """The rows without those that repeat another one of their tail in every number, and a note on each such row."""
+    alike: dict[tuple[object, ...], list[ObservationRow]] = {}
+    for item in observations:
+        numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate)
+        alike.setdefault((item.tail, repr(numbers)), []).append(item)
+    notes = (
+        Note.named("copied-trials", first=items[0].row, rows=rows_in_words(item.row for item in items[1:]))
+        for items in alike.values()
+        if len(items) > 1
+    )
+    return [items[0] for items in alike.values()], tuple(notes)
+
+
 def summarised(observations: Iterable[ObservationRow]) -> dict[tuple[float, float, float], RobotObservations]:
     """Mean and 95 % interval of every robot, by (channel diameter, wavelength, amplitude)."""
     groups: dict[tuple[float, float, float], list[ObservationRow]] = {}
@@ -322,7 +336,8 @@ def observations_answer(path: str | Path) -> dict[str, Any]:
         "measured": {name: sum(_measured(item, name) for item in items) for name in names},
     }
     doubts = convention_doubt(all_rates(items))
-    return envelope("observations", content, (*unread_columns(observation_table(path)), *doubts))
+    notes = (*unread_columns(observation_table(path)), *doubts, *without_copies(items)[1])
+    return envelope("observations", content, notes)
 
 
 def _measured(item: ObservationRow, name: str) -> bool:

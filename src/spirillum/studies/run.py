@@ -176,6 +176,7 @@ def computed_study(
     answers, band = answered(ModelTask), answered(BandTask)
     beside = BesideModels(answered(ReleaseTask), answered(SettledTask), answered(HeldTask), answered(TrialTask))
     warnings = warnings_of(loaded)
+    warnings += [] if observed is None else observed.notes
     warnings += [settled_basis(loaded.study.contact)] if beside.settled else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += missing_pose_notes(band)

@@ -23,7 +23,9 @@ from spirillum.measurement.observations import (
     check_driven,
     read_observations,
     summarised,
+    without_copies,
 )
+from spirillum.notes import Note
 from spirillum.robot.arguments import set_fields
 from spirillum.robot.fields import problems_in, refused_table
 from spirillum.robot.load import load
@@ -352,6 +354,7 @@ class ObservedArrays:
     intervals: Mapping[str, PerRobot]
     trials: PerRobot
     source: str
+    notes: tuple[Note, ...] = ()  #: On rows that do not count.
 
     def question(self) -> dict[str, Any]:
         """What of the observations decides the answer."""
@@ -380,7 +383,8 @@ def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:
             )
     for robot in {id(tails[item.tail]): tails[item.tail] for item in observations}.values():
         check_driven(path, [item for item in observations if tails[item.tail] is robot], robot)
-    means = summarised(observations)
+    kept, copies = without_copies(observations)
+    means = summarised(kept)
     rows = [means.get(tail) for tail in tails]
     columns = {name: _column(rows, name, 0) for name in _NAMES}
     return ObservedArrays(
@@ -389,6 +393,7 @@ def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:
         trials=np.array([0 if row is None else max(getattr(row, name).trials for name in _NAMES) for row in rows])
         * 1.0,
         source=Path(path).name,
+        notes=copies,
     )
 
 

@@ -23,7 +23,9 @@ def calibration(answer: Answer) -> Blocks:
     named |= {f"error of a trial, {CALLED[name]}": item for name, item in known.items()}
     yield grid("", "parameter", "value", "low", "high", "unit", rows=starmap(_numbers, named.items()))
     if answer["discrepancy"]:
-        yield "model discrepancy: by how much the model misses the mean of a tail, as a standard deviation"
+        typical = "what the fit leaves, or a typical one; one tail cannot tell it from wrong fixed numbers"
+        misses = "by how much the model misses the mean of a tail, as a standard deviation"
+        yield f"model discrepancy: {typical if answer['robots'] == 1 else misses}"
     yield from _friction(answer)
     if answer["method"] != "paper":
         yield Detail("low and high: 95 % interval")
@@ -51,6 +53,9 @@ def _numbers(name: str, item: Answer) -> tuple[str, ...]:
     return escape(name), *numbers, "" if unit == "1" else unit
 
 
+_MATTERS = 0.1  # relative change of B_eff over that of a constant, from which on the constant is named
+
+
 def _friction(answer: Answer) -> Iterator[str | Detail]:
     """The effective friction over the tails."""
     found = [tail["effective_friction"] for tail in answer["tails"] if "effective_friction" in tail]
@@ -65,6 +70,12 @@ def _friction(answer: Answer) -> Iterator[str | Detail]:
         f"{answer['friction']}): {low if low == high else f'{low} to {high}'}{interval} N m s/rad, "
         "tail by tail in predictions.csv"
     )
+    changes = answer.get("effective_friction_exact", {})
+    exact = [
+        f"{field} (1 % more: {by['value']:+.2g} %)" for field, by in changes.items() if abs(by["value"]) > _MATTERS
+    ]
+    if exact:
+        yield f"B_eff takes as exact: {', '.join(exact)}; --assume-uncertainty includes theirs"
     if answer.get("effective_friction_statement"):
         yield Detail(answer["effective_friction_statement"])
 
