@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -125,7 +125,8 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
     if says_synthetic(track.words):
         flags.append(Flag.named(SYNTHETIC))
     for name in SEEN:
-        rate, both = fits[name], {"rate": name.replace("_", "-"), "words": name.replace("_", " ")}
+        rate = fits[name]
+        both: dict[str, Any] = {"rate": name.replace("_", "-"), "words": name.replace("_", " ")}
         if not rate.measured:
             continue
         if not rate.steady:

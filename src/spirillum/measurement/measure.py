@@ -97,7 +97,7 @@ def compared(trials: Sequence[Trial]) -> list[Trial]:
         worst = outlying_trial([trial.quantities[name].value for trial in trials])
         if worst is None:
             continue
-        both = {"rate": name.replace("_", "-"), "words": name.replace("_", " ")}
+        both: dict[str, Any] = {"rate": name.replace("_", "-"), "words": name.replace("_", " ")}
         found[worst] = found[worst].flagged(Flag.named("outlier", level=100 * GRUBBS_LEVEL, **both))
     return found
 

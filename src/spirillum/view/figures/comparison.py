@@ -233,8 +233,8 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
 
 
 _WORDS: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#777777", "style": "italic"}
-_PALE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
-_SHARE: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#333333", "bbox": _PALE, "zorder": 6}
+_WHITE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
+_SHARE: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#333333", "bbox": _WHITE, "zorder": 6}
 
 
 def _finish(axes: Axes, values: np.ndarray) -> None:
