@@ -5,8 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from spirillum.vision.track.lost_frames import FrameSeries, Restored, restored_times
-from spirillum.vision.track.multiples import multiples_of
+from spirillum.vision.track.lost_frames import FrameSeries, Restored, multiples_of, restored_times
 
 PIXEL, FPS = 2.5e-4, 30.0
 

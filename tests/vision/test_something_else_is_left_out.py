@@ -6,7 +6,7 @@ A robot at two places has no speed.
 import numpy as np
 import pytest
 
-from spirillum.vision.track.false_detection import far_apart, something_else, something_else_flag
+from spirillum.vision.track.visibility import far_apart, something_else, something_else_flag
 
 LENGTH, PIXEL = 0.04, 2.5e-4
 TIME = np.arange(150) / 30.0

@@ -51,11 +51,11 @@ def read_track(
     # coords) and the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
     path = Path(path)
     first = re.split(r"[,;\t]", read_text(path, _WHAT, LARGEST_TABLE).lstrip(), maxsplit=1)[0].strip().lower()
-    size = ruled.stored_size
+    size = round(ruled.size[0] / ruled.stretch[0]), round(ruled.size[1] / ruled.stretch[1])  # of the stored picture
     points = _deeplabcut(path, size) if first == "scorer" else _trackpy(path, size, frame_of)
     order = np.argsort(points[0], kind="stable")
     frame = points[0][order]
-    nose, rear, centre = (ruled.display_pixels(item[order]) for item in points[1:])
+    nose, rear, centre = ((item[order] + 0.5) * np.array(ruled.stretch) - 0.5 for item in points[1:])
     if np.any(np.diff(frame) <= 0):
         raise InputError(f"{path}: frame {frame[1:][np.diff(frame) <= 0][0]:g} is a duplicate; allowed: once a frame")
     front, back = ruled.points(nose), ruled.points(rear)

@@ -45,15 +45,6 @@ class Ruled:
     stretch: tuple[float, float] = (1.0, 1.0)
     """Shown over stored pixels along rows and columns: other programs count the stored ones."""
 
-    @property
-    def stored_size(self) -> tuple[int, int]:
-        """Width and height of the stored picture, upright, pixels."""
-        return round(self.size[0] / self.stretch[0]), round(self.size[1] / self.stretch[1])
-
-    def display_pixels(self, stored: Samples) -> Samples:
-        """Pixels (k, 2) of the shown picture by those of the stored one."""
-        return np.asarray((stored + 0.5) * np.array(self.stretch) - 0.5)
-
     @classmethod
     def plain(cls, scale: Scale, size: tuple[int, int], *, leftward: bool) -> Ruled:
         """A uniform scale without perspective and refraction."""
@@ -97,9 +88,9 @@ def read_marks(path: str | Path) -> dict[str, Marks]:
 
 
 def _marks(table: Table, rows: list[TableRow]) -> Marks:
-    def column(name: str, factor: float = 1.0) -> Samples:
+    def column(name: str) -> Samples:
         place = table.column(name)
-        return np.array([math.nan if place is None else factor * row.number(place, name) for row in rows])
+        return np.array([math.nan if place is None else row.number(place, name) for row in rows])
 
     frame, time = column("frame"), column("time_s")
     for row, number, moment in zip(rows, frame, time, strict=True):
@@ -218,22 +209,18 @@ def track_of_marks(
     picture = np.concatenate([marks.pixels[inside], np.full((inside.size, 2), np.nan)], axis=1)
     click = np.full(inside.size, _LENGTH_ERROR if ruled is None else _CLICK_ERROR * scale.length_per_pixel)
     angle_error = np.full(inside.size, _ANGLE_ERROR)
+    few = {1: "the only reading was", 2: "both readings were"}
+    readings = few.get(inside.size, f"all {inside.size} readings were")
     return Track(
         time=time[inside], frame=marks.frame[inside], position=_positions(marks, ruled)[inside], heading=nothing,
         body_angle=marks.body_angle[inside], tail_phase=marks.tail_phase[inside],
         position_error=click, body_angle_error=angle_error, tail_phase_error=angle_error,
         picture=picture, size=ruled.size if ruled else (0, 0), scale=scale, setup=setup, video=video,
         flags=(
-            Flag.named(BY_HAND, readings=_all_readings(inside.size), table=marks.path.name),
+            Flag.named(BY_HAND, readings=readings, table=marks.path.name),
             *_unwrapped_flag(marks),
         ),
     )  # fmt: skip
-
-
-def _all_readings(count: int) -> str:
-    """Subject and verb of a sentence on all readings."""
-    few = {1: "the only reading was", 2: "both readings were"}
-    return few.get(count, f"all {count} readings were")
 
 
 def _unwrapped_flag(marks: Marks) -> tuple[Flag, ...]:

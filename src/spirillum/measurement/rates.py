@@ -166,15 +166,15 @@ def rate_of(
     )
 
 
-def mean_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float, float, float]:
-    """Mean of a series and its confidence interval, with the noise model of `rate_of` without periodic errors."""
+def mean_of(time: Samples, values: Samples) -> tuple[float, float, float]:
+    """Mean of a series and its 95 % interval, with the noise model of `rate_of` without periodic errors."""
     used = np.isfinite(values) & np.isfinite(time) & ~outlying_frames(time, values)
     if used.sum() < _FEWEST or np.ptp(time[used]) <= 0:
         return float(values[used].mean()) if used.any() else np.nan, np.nan, np.nan
     t = time[used]
     s = (t - 0.5 * (t[0] + t[-1])) / (0.5 * (t[-1] - t[0]))
     [line] = _fitted(_Blocks.of(s, values[used], np.ones(t.size), []), (2,))
-    return line.interval(np.array([1.0, 0.0]), level)
+    return line.interval(np.array([1.0, 0.0]), 0.95)
 
 
 def _residual(values: Samples, used: np.ndarray, inside: Samples) -> Samples:

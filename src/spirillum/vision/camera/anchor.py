@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame
 from spirillum.vision.video.pictures import reduced, reduction
 
@@ -48,7 +48,6 @@ class Anchor:
 
     def pose(self, flat: Samples, start: PictureRegistration) -> PictureRegistration:
         """How a high-pass filtered picture lies against the anchor; `start` where the anchor shows no edge."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         rows, columns, slopes, there = self._edges
         if not rows.size:
             return start
@@ -71,7 +70,6 @@ class Anchor:
 
     def steadied(self, image: np.ndarray, pose: PictureRegistration) -> np.ndarray:
         """A picture moved to where the anchor is; beyond its borders they go on as they are."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         size = (image.shape[1], image.shape[0])
         flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
         moved = cv2.warpAffine(image, _matrix(pose, size), size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
@@ -80,7 +78,6 @@ class Anchor:
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray, Samples, Samples]:
         """Rows and columns of the steepest pixels, slopes by right, down and roll, and their brightness."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         slope_u, slope_v = (0.5 * cv2.Sobel(self.flat, cv2.CV_32F, *order, ksize=1) for order in ((1, 0), (0, 1)))
         steep = np.hypot(slope_u, slope_v)
         margin = _REACH * self.flat.shape[1] // _COARSE
@@ -157,7 +154,6 @@ def _matrix(pose: PictureRegistration, size: tuple[int, int]) -> Samples:
 
 
 def _flat(image: np.ndarray) -> Samples:
-    cv2 = import_optional("cv2", "measuring a video", "video")
     grey = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_RGB2GRAY)
     wide = max(15.0, grey.shape[1] / 20.0)
     few = max(1, int(wide / _BLUR))
@@ -172,7 +168,6 @@ def _flat(image: np.ndarray) -> Samples:
 
 def _texture(flat: Samples) -> Samples:
     """Coarse structure in a reduced picture, bounded."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     factor = max(1, flat.shape[1] // _COARSE)
     blurred = cv2.GaussianBlur(flat, (0, 0), flat.shape[1] / _COARSE)
     size = flat.shape[1] // factor, flat.shape[0] // factor
@@ -183,7 +178,6 @@ def _texture(flat: Samples) -> Samples:
 
 def _coarse_shift(one: Samples, other: Samples, width: int) -> tuple[float, float]:
     """Shift of the second texture against the first one, pixels of the full picture."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     inside = np.ascontiguousarray(one[:, _REACH:-_REACH, _REACH:-_REACH])
     score = sum(cv2.matchTemplate(b, a, cv2.TM_CCOEFF_NORMED) for a, b in zip(inside, other, strict=True))
     row, column = (int(place) for place in np.unravel_index(int(np.argmax(score)), score.shape))

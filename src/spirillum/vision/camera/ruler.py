@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.optional_dependencies import import_optional
+from spirillum.vision.video import opencv as cv2
 
 _SHORTEST = 3.0  # shortest resolved distance of lines, pixels
 _FEWEST = 8  # fewest lines of a ruler
@@ -113,7 +113,6 @@ def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
     """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones."""
     # Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
     # 1 / factor. The full picture shows at which of these it holds the larger part of its power.
-    cv2 = import_optional("cv2", "measuring a video", "video")
     way = np.array([math.cos(lines.roll), math.sin(lines.roll)])
     side = np.array([-way[1], way[0]])
     power: Samples = np.zeros(1)
@@ -152,7 +151,6 @@ def ruler_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
 
 def _turned(part: np.ndarray, turn: float) -> tuple[np.ndarray, Samples]:
     """A picture turned against the clock, and the map from its pixels to those of the first one, (2, 3)."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     height, width = part.shape[:2]
     c, s = abs(math.cos(turn)), abs(math.sin(turn))
     size = math.ceil(c * width + s * height), math.ceil(s * width + c * height)
@@ -167,7 +165,6 @@ def _turned(part: np.ndarray, turn: float) -> tuple[np.ndarray, Samples]:
 
 def _lines_of(part: Samples) -> Lines | None:
     """Detect a ruler in one channel of a region, (h, w)."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     flat = part / np.maximum(cv2.GaussianBlur(part, (0, 0), 15.0), 1.0) - 1.0
     flat = np.clip(flat, -0.6, 0.6)
     frequency = _frequency(flat)

@@ -11,12 +11,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, optics_of
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Checkerboard, Setup
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.display import AS_STORED, Display
 from spirillum.vision.video.pictures import IMAGES, bits_of, eight_bit, read_header, read_image
 
@@ -38,7 +38,6 @@ class Lens(NamedTuple):
 
 def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: Display = AS_STORED) -> Lens:
     """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion."""
-    cv2 = import_optional("cv2", "a checkerboard", "video")
     images = folder / board.images
     if not images.is_dir():
         raise InputError(f"camera.checkerboard.images = {board.images!r} is no folder; allowed: a folder of pictures")

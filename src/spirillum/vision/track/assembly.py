@@ -24,7 +24,6 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
 from spirillum.vision.track.cuts import Hops, clock_of, cuts_in, hops_in, no_motion_flag, one_picture, standstill_flag
-from spirillum.vision.track.false_detection import far_apart, something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection, learnt_from
 from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
@@ -34,7 +33,14 @@ from spirillum.vision.track.steadiness import PictureSteps, camera_flags, pictur
 from spirillum.vision.track.steps import FrameDetection, FrameTracker, Record
 from spirillum.vision.track.track import CUES, Agreement, RobotMotion, Track, agreement_of
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, static_object_flag, unwrapped
-from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
+from spirillum.vision.track.visibility import (
+    cut_off,
+    far_apart,
+    gaps_of,
+    sight_flags,
+    something_else,
+    something_else_flag,
+)
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.core import profiles_across, robust_change, shifts_of_profiles
-from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale, theil_sen_line
 from spirillum.vision.camera.optics import BodyPose, Optics
@@ -19,6 +18,7 @@ from spirillum.vision.track.contour import GROUPS, Contour, contour_of
 from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
 from spirillum.vision.track.search import Shape
 from spirillum.vision.track.track import cue_shifts
+from spirillum.vision.video import opencv as cv2
 
 
 class PoseFit(NamedTuple):
@@ -210,10 +210,12 @@ class BodyFinder:
         stops = [int(np.clip(value, a, b)) for value, a, b in ((high[0] + 2, left, right), (high[1] + 2, top, bottom))]
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
             return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None, pose, places)
-        bounds = ends[0], ends[1], stops[0], stops[1]
         if self.seal is None:
-            return _Part(grey_part(image, bounds, OUTLINE.blur), np.array(ends, dtype=float), None, pose, places)
-        colours = colour_part(image, bounds, OUTLINE.blur)
+            grey = cv2.GaussianBlur(
+                grey_of(image[ends[1] : stops[1], ends[0] : stops[0]].astype(np.float32)), (0, 0), OUTLINE.blur
+            )
+            return _Part(np.asarray(grey)[..., None], np.array(ends, dtype=float), None, pose, places)
+        colours = colour_part(image, (*ends, *stops), OUTLINE.blur)
         return _Part(grey_of(colours.picture), colours.origin, colours, pose, places)
 
     def _places(self, part: _Part, pose: BodyPose) -> tuple[Samples, Samples, Samples, Samples]:
@@ -407,17 +409,8 @@ def _elongation(left: Samples, slopes: Samples, used: Samples, nose: np.ndarray,
         return np.nan
 
 
-def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> np.ndarray:
-    """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255, (h, w, 1)."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
-    left, top, right, bottom = bounds
-    grey = grey_of(image[top:bottom, left:right].astype(np.float32))
-    return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))[..., None]
-
-
 def grey_of(colours: np.ndarray) -> np.ndarray:
     """Brightness of a picture in single precision, (h, w, 1)."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY))[..., None]
 
 

@@ -362,7 +362,7 @@ class LostFramesConstants:
 
 @dataclass(frozen=True)
 class MultiplesConstants:
-    """Steps that are multiples of one (`multiples`)."""
+    """Steps that are multiples of one (`lost_frames`)."""
 
     fewest: int = 30  #: Fewest steps for it.
     most: float = 12.0  #: Largest of them over the smallest.

@@ -14,11 +14,11 @@ from numpy.polynomial import chebyshev
 
 from spirillum.arrays import Samples
 from spirillum.kernels.core import edge_places, edge_points
-from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline, Segment
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, placed
+from spirillum.vision.video import opencv as cv2
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,6 @@ def _seal(robot: Robot, radius: float, spacing: float) -> Samples:
 
 def _hull(points: Samples) -> Samples:
     """Vertices of the convex hull in their order; chosen in single precision, which is fast, and exact themselves."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     chosen = cv2.convexHull(points.astype(np.float32), returnPoints=False)
     return np.asarray(points[chosen[:, 0]])
 

@@ -266,13 +266,11 @@ def no_motion_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, 
     time, x, body_angle, tail_phase = motion
     limits = [(x, STANDING.moved * length_per_pixel), *((angle, STANDING.turned) for angle in (body_angle, tail_phase))]
     read = [(values[known], limit) for values, limit in limits if (known := np.isfinite(values)).any()]
-    if len(read) < 2 or not np.isfinite(x).any() or any(_total_change(values) > limit for values, limit in read):
+    if len(read) < 2 or not np.isfinite(x).any():
         return ()
+    for values, limit in read:  # from the first to the last fifth
+        few = max(1, len(values) // 5)
+        if abs(np.median(values[-few:]) - np.median(values[:few])) > limit:
+            return ()
     turned = np.degrees(STANDING.turned)
     return (Flag.named("robot-stands-still", span=np.ptp(time), moved=STANDING.moved, turned=turned),)
-
-
-def _total_change(values: Samples) -> float:
-    """Change of a series from its first to its last fifth, by medians."""
-    few = max(1, len(values) // 5)
-    return float(abs(np.median(values[-few:]) - np.median(values[:few])))

@@ -11,7 +11,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.optional_dependencies import import_optional
 from spirillum.vision.camera.optics import BodyPose, Optics, opposite, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
@@ -22,6 +21,7 @@ from spirillum.vision.track.search import close_places
 from spirillum.vision.track.size import best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame
 
 _SIZES = (1.0, 0.3, 3.3)
@@ -156,7 +156,6 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
 
 def _is_noise_alone(frames: list[Frame], still: Samples) -> bool:
     """Whether the frames differ from their background by noise alone."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     for frame in frames:
         image = frame.reduced(frame.image.shape[1] // still.shape[1])
         change = cv2.GaussianBlur(np.subtract(image, still, dtype=np.float32), (0, 0), STANDING.blur).mean(axis=2)
@@ -228,10 +227,9 @@ def identified_at(
         list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))
     if wire.readable > IDENTITY.sure_share:  # the tail is at the expected end
         start = replace(start, flags=())
-    read = float(np.mean([np.isfinite(stripes.read(image, pose)[0]) for image, pose in start.seen]))
-    striped = stripes.fits and read > IDENTITY.least_share
     total = size * start.size
     found = Identified(start, stripes, wire, total, robot=False)
+    striped = found.stripes_read > IDENTITY.least_share and stripes.fits
     as_stated = abs(np.log(total)) <= IDENTITY.size_tolerance
     if as_stated and start.clearness > SIZE.clearness:
         return found._replace(robot=striped or wire.readable > IDENTITY.least_share)

@@ -11,7 +11,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import least_squares_line
 from spirillum.vision.camera.optics import BodyPose, Optics, opposite, positions_seen_by
@@ -21,6 +20,7 @@ from spirillum.vision.track.constants import DETECTION, SEAL, VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places, most_likely, refined
 from spirillum.vision.track.size import OutlineFit, apparent_outline, clearness, resized
 from spirillum.vision.track.visibility import rivals_in, turned_flags
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame
 
 
@@ -63,7 +63,6 @@ class SealSearch:
 
     def _score(self, image: np.ndarray) -> Samples:
         """Colour of a block around each place, over that of the most colourful of its four surroundings."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         flat = cv2.GaussianBlur(image, (0, 0), self._blur)
         flat = cv2.remap(flat, self._plane.columns, self._plane.rows, cv2.INTER_LINEAR, borderValue=(0, 0, 0))
         red, green, blue = np.moveaxis(flat.astype(np.float32), -1, 0)
@@ -125,10 +124,6 @@ class Start:
         if self.body.seal is not None:
             return self.body.place_by_seal(frame.image, guess).pose
         return close_place(frame, still, self.body, guess).pose
-
-    def as_clear(self, score: float) -> bool:
-        """Whether edges are as clear as a robot's."""
-        return score > DETECTION.faint * self.score
 
 
 class _Learnt(NamedTuple):

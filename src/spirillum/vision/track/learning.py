@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import background, bounds_of, sight_of
 from spirillum.vision.camera.optics import BodyPose, project
@@ -21,6 +20,7 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import OUTLINE, SIZE, STRIPES
 from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.track.search import searched_at
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
 
@@ -69,7 +69,6 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
     veil = _veil(images, poses, body)
     if veil is not None:
         return veil
-    cv2 = import_optional("cv2", "measuring a video", "video")
     bodies = np.array([_covered(body, pose) for pose in poses])
     (left, top, right, bottom), wide = body.bounds, int(np.ptp(bodies[0], axis=0).min())
     low = np.maximum(bodies.min(axis=(0, 1)).astype(int) - wide, (left, top))
@@ -173,7 +172,6 @@ def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
     # What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that
     # are shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole
     # way: a highlight that reaches over the body's rim would else lose there, and seem to stand.
-    cv2 = import_optional("cv2", "measuring a video", "video")
     middle, shape = len(white) // 2, white[0].shape
     moved = np.round(bodies.mean(axis=1) - bodies[middle].mean(axis=0)).astype(int)
     covered, here = np.zeros(shape, dtype=np.uint8), np.zeros(shape, dtype=np.uint8)
@@ -198,7 +196,6 @@ def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
 
 def _pass(body: BodyFinder, poses: Sequence[BodyPose], spots: np.ndarray, low: np.ndarray) -> bool:
     """Whether edges that show how far the robot has moved come nearer to spots, or farther away, within their rims."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     reach = OUTLINE.half_profile + GLARE.rim * np.sqrt(np.count_nonzero(spots) / np.pi)
     far = np.pad(cv2.distanceTransform((~spots).astype(np.uint8), cv2.DIST_L2, 5), 1, constant_values=reach)
     last, seen_at = np.array(far.shape) - 1, []

@@ -15,13 +15,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, project
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import GROUPS
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame
 
 
@@ -184,7 +184,6 @@ def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: Body
         return 0.0
     columns, rows = np.clip(pixels, (left, top), (right - 1, bottom - 1)).T
     still = np.median([image[rows, columns].mean(axis=1) for image in images], axis=0).reshape(grid.shape[:2])
-    cv2 = import_optional("cv2", "measuring a video", "video")
     wide = 2 * max(3, round(LONE_OUTLINE.flat * 2.0 * radius / step)) + 1
     return float(mad_scale(still - cv2.blur(still, (1, wide), borderType=cv2.BORDER_REPLICATE)))
 

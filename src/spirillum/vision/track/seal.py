@@ -13,9 +13,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.core import profiles_across, seal_shares, seal_shifts
-from spirillum.optional_dependencies import import_optional
 from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
+from spirillum.vision.video import opencv as cv2
 
 _SIDES = tuple(GROUPS.index(name) for name in ("rear", "left", "right", "seal"))
 _FLANKS = False, True, True, False  # which of the sides are silhouettes
@@ -97,7 +97,6 @@ class SealEdges:
 
     def learn_colours(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
         """Learn the colours at the silhouette, and the profile of an edge."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         flanks = np.concatenate(self._sides[1:3])
         inside = self._offsets <= -1.0
         self._learn_ground(parts, places)
@@ -213,7 +212,6 @@ class SealEdges:
 
 def colour_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> ColourPart:
     """Blurred colours of a part (left, top, right, bottom) of a picture, 0 to 255."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     part = cv2.GaussianBlur(image[top:bottom, left:right].astype(np.float32), (0, 0), blur)
     return ColourPart(np.asarray(part), np.array([left, top], dtype=float))

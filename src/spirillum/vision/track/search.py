@@ -10,9 +10,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.core import edge_scores
-from spirillum.optional_dependencies import import_optional
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.contour import GROUPS, Contour
+from spirillum.vision.video import opencv as cv2
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,6 @@ def _background(still: Samples, bounds: tuple[int, int, int, int], factor: int) 
     left, top, right, bottom = bounds
     if factor == 1:
         return still[top:bottom, left:right]
-    cv2 = import_optional("cv2", "measuring a video", "video")
     low, high = np.array([left, top]) // factor, -(-np.array([right, bottom]) // factor)
     part = still[low[1] : high[1], low[0] : high[0]]
     large = cv2.resize(part, (part.shape[1] * factor, part.shape[0] * factor), interpolation=cv2.INTER_LINEAR)
@@ -206,7 +205,6 @@ def _slopes(
 ) -> tuple[Samples, Samples, float]:
     """Brightness gradients of a reduced region, bounded at their 95 % quantile, and their mean magnitude."""
     # The gradients are transposed, (w, h).
-    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     whole, background = (
         cv2.cvtColor(part.astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)

@@ -17,7 +17,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
@@ -32,6 +31,7 @@ from spirillum.vision.track.lone_outline import Appearance, appearance_of
 from spirillum.vision.track.search import searched_at
 from spirillum.vision.track.size import best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
 
@@ -132,7 +132,6 @@ class _Stills:
     @cached_property
     def changes(self) -> bool:
         """Whether anything moves, in pictures at most 640 pixels wide: an empty tube shows noise alone."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         factor = -(-max(self.frames[0].image.shape) // SETUP_FREE.changing_width)
         stack = np.array([frame.reduced(factor).mean(axis=2, dtype=np.float32) for frame in self.frames])
         stack = np.array([cv2.GaussianBlur(grey, (0, 0), 1.0) for grey in stack])

@@ -42,11 +42,6 @@ def clearness(found: Sequence[Sequence[PoseCandidate]]) -> float:
     return float(np.median([some[0].score / max(some[2].score, 1e-9) if len(some) > 2 else 0.0 for some in found]))
 
 
-def _resemblance(found: Sequence[Sequence[PoseCandidate]]) -> float:
-    """Clearness times the median score: a part of a robot may be as clear, but has fainter edges."""
-    return clearness(found) * float(np.median([some[0].score if some else 0.0 for some in found]))
-
-
 def best_other_size(
     body: BodyFinder, images: Sequence[np.ndarray], still: Samples, least: float = SIZE.clearness, about: float = 1.0
 ) -> float | None:
@@ -65,7 +60,10 @@ def best_other_size(
             unclear = [one for one in places if clearness([one]) <= least]
             if 2 * len(unclear) >= len(few) + 1:
                 return 0.0  # the others do not raise the median
-        return _resemblance(places) if clearness(places) > least else 0.0
+        if (clear := clearness(places)) <= least:
+            return 0.0
+        # A part of a robot may be as clear, but has fainter edges.
+        return clear * float(np.median([some[0].score if some else 0.0 for some in places]))
 
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
         resemblance = list(pool.map(at, _SIZES.tolist()))

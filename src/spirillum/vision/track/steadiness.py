@@ -17,12 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale, running_median
 from spirillum.vision.camera.optics import project
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.initial_detection import Start
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame
 
 
@@ -120,7 +120,6 @@ def shift_between(one: Samples, other: Samples) -> float:
     """Shift of a picture to the right of another one, pixels, robust to objects that move in it."""
     # Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
     # least median residual is taken, or the one nearest to 0 if it fits about as well.
-    cv2 = import_optional("cv2", "measuring a video", "video")
     inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)
     correlation = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
     peaks = np.argwhere(
@@ -158,7 +157,6 @@ def shift_between(one: Samples, other: Samples) -> float:
 
 def _flat(still: Samples, bounds: tuple[int, int, int, int], rows: tuple[int, int]) -> Samples:
     """High-pass filtered brightness; 0 in the rows of the robot."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     grey = cv2.cvtColor(still[top:bottom, left:right].astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)
     flat = np.clip(grey / np.maximum(cv2.GaussianBlur(grey, (0, 0), 15.0), 1.0) - 1.0, -0.6, 0.6)
@@ -205,7 +203,6 @@ class PictureChange:
 
     def of(self, image: np.ndarray) -> tuple[float, float]:
         """Root mean square change of brightness from the last picture and the one before, of 255; NaN without one."""
-        cv2 = import_optional("cv2", "measuring a video", "video")
         left, top, right, bottom = self.bounds
         part = cv2.cvtColor(image[top:bottom, left:right], cv2.COLOR_RGB2GRAY)
         share = min(1.0, PICTURE_CHANGE.width / max(part.shape))

@@ -14,6 +14,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.body import PoseFit
+from spirillum.vision.track.constants import DETECTION
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.initial_detection import close_place, pose_on_path
 from spirillum.vision.track.search import PoseCandidate, candidates
@@ -170,7 +171,7 @@ class FrameTracker:
         least = FOLLOWING.more_edges * lost.share if lost.known else 0.0
         start = self.known.start
         for candidate in self._candidates(frame):
-            if start.as_clear(candidate.score):
+            if candidate.score > DETECTION.faint * start.score:
                 found = start.body.place(frame.image, candidate.pose)
                 if found.known and found.share > least:
                     return found

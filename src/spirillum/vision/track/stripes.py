@@ -148,15 +148,12 @@ class Stripes:
         if count < SINGLE_LINE.frames:
             self.flags = (Flag.named("line-unreadable", count=count, frames=len(fits)),)
         elif self._typical_loss(fits) >= STRIPES.fits or contrast < SINGLE_LINE.kept * first:
-            self.flags = (Flag.named("line-does-not-fit", line=self._line_words()),)
+            counts = np.bincount(self.order, minlength=2)
+            line, seal = self.names[int(np.argmin(counts))], self.names[int(np.argmax(counts))]
+            wide = 360.0 * counts.min() / counts.sum()
+            self.flags = (Flag.named("line-does-not-fit", wide=wide, line=line, seal=seal),)
         else:
             self.fits = True
-
-    def _line_words(self) -> str:
-        """The line in words, as `line of 15 degrees, white on black`."""
-        counts = np.bincount(self.order, minlength=2)
-        line, seal = self.names[int(np.argmin(counts))], self.names[int(np.argmax(counts))]
-        return f"line of {360.0 * counts.min() / counts.sum():.0f} degrees, {line} on {seal}"
 
     def _as_wide(self, profiles: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
         """Whether stripes are seen as wide as stated; of patterns with several widths the fit alone decides."""

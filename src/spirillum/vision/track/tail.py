@@ -319,14 +319,10 @@ class TailWave:
         tail = self.robot.tail
         if len(fits):
             share = float(fits[:, 7].sum() / max(fits[:, 8].sum(), 1e-300))
-            if abs(share) > 0.2 and self._fits_better(ridges, 1.0 + share, own):
+            other = self.scores_by_wavelength(ridges, 1.0 + share) if abs(share) > 0.2 else None
+            if other is not None and float(np.interp(1.0, _FACTORS, other)) > own:  # it lies more on the wire
                 given = tail.amplitude * 1e3
                 self._flags.append(Flag.named("tail-of-other-amplitude", seen=(1.0 + share) * given, given=given))
-
-    def _fits_better(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float, own: float) -> bool:
-        """Whether a wave of another amplitude over that of the file, at its wavelength, lies more on the wire."""
-        scores = self.scores_by_wavelength(ridges, amplitude)
-        return scores is not None and float(np.interp(1.0, _FACTORS, scores)) > own
 
     def _apparent_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
         """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen."""

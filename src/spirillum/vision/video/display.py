@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
+from spirillum.vision.video import opencv as cv2
 
 ASPECTS = (0.2, 5.0)  #: Least and largest width of a pixel over its height.
 _SLANT = 0.02  # tangent of an angle to the next quarter turn from which on it is mentioned
@@ -46,7 +47,6 @@ class Display(NamedTuple):
         height, stored = picture.shape[:2]
         width = max(1, round(stored * self.aspect))
         if width != stored:
-            cv2 = import_optional("cv2", "measuring a video", "video")
             how = cv2.INTER_CUBIC if width > stored else cv2.INTER_AREA
             picture = cv2.resize(picture, (width, height), interpolation=how)
         if self.transposed:

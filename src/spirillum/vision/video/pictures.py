@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.files import opened, read_bytes
 from spirillum.files.limits import LARGEST_PICTURE, MOST_IMAGES, MOST_PIXELS
-from spirillum.optional_dependencies import import_optional
+from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.display import Display
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")  #: Endings of images.
@@ -67,7 +67,6 @@ def reduced(image: np.ndarray, factor: int) -> np.ndarray:
     """A picture whose blocks of `factor` by `factor` pixels are made one, their mean; from the upper left."""
     if factor == 1:
         return image
-    cv2 = import_optional("cv2", "measuring a video", "video")
     height, width = image.shape[0] // factor, image.shape[1] // factor
     whole = image[: height * factor, : width * factor]
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA))
@@ -88,7 +87,6 @@ def eight_bit(image: np.ndarray, bits: int) -> np.ndarray:
 
 def read_image(path: Path, *, grey: bool = False, display: Display | None = None) -> np.ndarray | None:
     """A picture as it is stored, 8-bit or 16-bit BGR or grey values; None if it cannot be decoded."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     data = read_bytes(path, _WHAT, LARGEST_PICTURE)
     header = _header(BytesIO(data), path)
     if header is None:
@@ -106,7 +104,6 @@ def read_image(path: Path, *, grey: bool = False, display: Display | None = None
 
 def read_pages(path: Path, header: Header, start: int, count: int) -> list[np.ndarray | None]:
     """Some pages of a TIFF file as they are stored, 8-bit or 16-bit BGR; None for one that cannot be decoded."""
-    cv2 = import_optional("cv2", "measuring a video", "video")
     try:
         _, found = cv2.imreadmulti(str(path), start, count, flags=_flags(grey=False))
     except cv2.error:
@@ -124,7 +121,6 @@ def read_header(path: Path) -> Header | None:
 
 
 def _flags(*, grey: bool) -> int:
-    cv2 = import_optional("cv2", "measuring a video", "video")
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     return int(kind | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION)
 
