@@ -64,7 +64,7 @@ def made(stand_in: Any) -> Callable[..., Made]:
         links = tube_robot(steady, table, around, turn=turn, weight=weight)
 
         def run(start: Any, duration: float, *, on: Any = None, samples: int = 20, **options: Any) -> Any:
-            timing = Timing(duration=duration, on=on, samples_per_turn=samples)
+            timing = Timing.of({"duration": duration, "on": on, "samples_per_turn": samples})
             begun = released_state(robot, links, *start) if isinstance(start, tuple) else start
             return tube_run(steady, links, begun, timing.timetable(turn, 1.0), **options)
 
@@ -540,7 +540,7 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     file.write_text("# pulsating\ntime_s,flow_mm_s\n0,0\n1,2\n2,-1\n")
     asked = InTube.of({"azimuth": "20 deg", "wait": "2 s", "friction_coefficient": 0.2, "flow": file})
     placed = Placement.of({"gap": "0.3 mm", "yaw": "1 deg", "pitch": "-0.5 deg"})
-    times = Timing(duration="2 s")
+    times = Timing.of({"duration": "2 s"})
     found = run_in_tube(steady, table, times, Release(placed, asked, 1e-4), Field(), None)
     np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], [0, 1, 2], [0, 2e-3, -1e-3]), atol=1e-15)
     assert found.attrs["ends"] == "imposed flow"
@@ -553,14 +553,20 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     assert float(found["electrical_energy"][0]) == 0.0
     assert "Reynolds" not in found.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n0,0\n2,-40\n")
-    fast = run_in_tube(steady, table, Timing(duration="0.01 s"), Release(placed, InTube(flow=file)), Field(), None)
+    fast = run_in_tube(
+        steady, table, Timing.of({"duration": "0.01 s"}), Release(placed, InTube(flow=file)), Field(), None
+    )
     assert "Reynolds number (imposed flow, body diameter) = 0.2" in fast.attrs["warnings"]
     assert "begins at" not in fast.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n1,0\n2,1\n")
-    late = run_in_tube(steady, table, Timing(duration="0.01 s"), Release(placed, InTube(flow=file)), Field(), None)
+    late = run_in_tube(
+        steady, table, Timing.of({"duration": "0.01 s"}), Release(placed, InTube(flow=file)), Field(), None
+    )
     assert f"{file} begins at 1 s, and the run ends at 0.01 s" in late.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n0,0\n0.005,1\n")
-    early = run_in_tube(steady, table, Timing(duration="0.01 s"), Release(placed, InTube(flow=file)), Field(), None)
+    early = run_in_tube(
+        steady, table, Timing.of({"duration": "0.01 s"}), Release(placed, InTube(flow=file)), Field(), None
+    )
     assert f"{file} ends at 0.005 s, and the run at 0.01 s: from then on" in early.attrs["warnings"]
     open_ended = run_in_tube(steady, table, times, Release(placed, InTube()), Field(), None)
     assert "mean_flow" not in run_answer(open_ended)["in_tube"]

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from spirillum.dynamics.free_motion import Path, _around
+from spirillum.dynamics.free_motion import FollowedPath, _around
 from spirillum.dynamics.return_map import STEPS, Turn
 from spirillum.kernels import core
 from spirillum.swimming.released_motion import State, SteadyState
@@ -30,7 +30,7 @@ def test_statement_says_whether_and_why(state: State, rate: float, words: str) -
 
 def test_means_are_over_the_last_circuit() -> None:
     """Turns of 0.5 s, 1.75 s around: the circuit begins in the seventh of ten turns, whose start is where it does."""
-    path, steps = Path(), 100
+    path, steps = FollowedPath(), 100
     place = {name: column for column, name in enumerate(STEPS)}
     states = [np.zeros(core.STATE_SIZE)]
     for number in range(10):

@@ -164,9 +164,9 @@ def test_battery_gives_duty_times_the_motor_current() -> None:
         ({"timing": {"on": [(1.0, 0.5)]}}, "on = 1 s to 0.5 s"),
         ({"timing": {"on": [(0.0, 1.0), (0.5, 2.0)]}}, "on = 0.5 s to 2 s"),
         ({"timing": {"on": [(float("nan"), 1.0)]}}, 'on = "nan s"'),
-        ({"timing": {"samples_per_turn": 0}}, "samples-per-turn"),
-        ({"timing": {"turns": 1e5, "samples_per_turn": 10_000}}, "samples-per-turn"),
-        ({"timing": {"duration": "1e6 s", "samples_per_turn": 1}}, "samples-per-turn = 1 makes"),
+        ({"timing": {"samples_per_turn": 0}}, "samples_per_turn"),
+        ({"timing": {"turns": 1e5, "samples_per_turn": 10_000}}, "samples_per_turn"),
+        ({"timing": {"duration": "1e6 s", "samples_per_turn": 1}}, "samples_per_turn = 1 makes"),
     ],
 )
 def test_wrong_runs_are_refused(options: dict[str, object], words: str) -> None:

@@ -141,7 +141,7 @@ class Timing(Options):
         count = math.ceil(end / turn * self.samples_per_turn)
         if count > _LARGEST_SAMPLES:
             raise InputError(
-                f"samples-per-turn = {self.samples_per_turn} makes {count} samples in {end:g} s; allowed: at most "
+                f"samples_per_turn = {self.samples_per_turn} makes {count} samples in {end:g} s; allowed: at most "
                 f"{_LARGEST_SAMPLES} in all, as of a shorter time"
             )
         time = np.linspace(0.0, end, max(count, 1) + 1)

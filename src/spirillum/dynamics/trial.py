@@ -294,7 +294,7 @@ def quick_run(
     from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
 
     steady = predict(robot, model=WALLED, placement=release.placement, band=False, **settings)
-    times = Timing(duration=duration, samples_per_turn=_SAMPLES_PER_TURN)
+    times = Timing.of({"duration": duration, "samples_per_turn": _SAMPLES_PER_TURN})
     return run_in_tube(steady, table, times, release, Field(), progress=None, tolerance=_TOLERANCE)
 
 
