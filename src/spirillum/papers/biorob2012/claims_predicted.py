@@ -24,9 +24,10 @@ from spirillum.papers.biorob2012.evidence import (
     FrictionModelRuns,
     Judgement,
     claim_of,
+    verdict_of,
 )
 from spirillum.papers.biorob2012.published import VELOCITY_DROPS
-from spirillum.papers.claim import Claim, PredictedVerdict, Verdict
+from spirillum.papers.claim import Claim, PredictedVerdict
 from spirillum.robot.load import load
 from spirillum.studies.released_robots import INFERRED_BY
 from spirillum.units import Hz
@@ -53,17 +54,17 @@ def robot_and_channel(evidence: Evidence) -> Iterator[Claim]:
     length = derived["robot_length"].value
     found = f"{1e3 * length:.0f} mm (body, coupling and tail)"
     reason = "sum of Table I's lengths"
-    yield claim_of("length", found, _verdict(length > ROBOT_LENGTH), reason, length=1e3 * ROBOT_LENGTH)
+    yield claim_of("length", found, verdict_of(length > ROBOT_LENGTH), reason, length=1e3 * ROBOT_LENGTH)
     weight = derived["submerged_weight"].value
     yield claim_of(
         "weight",
         f"submerged weight {1e3 * weight:.1f} mN",
-        _verdict(weight > 0),
+        verdict_of(weight > 0),
         "Table I's mass and volumes, copper wire; the clearance of the coupling is assumed",
     )
     if robot.channel is not None and narrow.channel is not None:
         reduction = 1.0 - narrow.channel.diameter / robot.channel.diameter
-        holds = _verdict(bool(np.isclose(reduction, NARROWER)))
+        holds = verdict_of(bool(np.isclose(reduction, NARROWER)))
         yield claim_of("narrower", f"{100 * reduction:.0f} %", holds, "Table I", narrower=100 * NARROWER)
     if robot.motor is not None:
         friction = robot.motor.rotor_friction
@@ -83,7 +84,7 @@ def method(evidence: Evidence) -> Iterator[Claim]:
     yield claim_of(
         "sampling",
         f"fastest tail at the friction-free bound {fastest:.1f} Hz; Nyquist limit {0.5 * FRAME_RATE:.0f} Hz",
-        _verdict(fastest < 0.5 * FRAME_RATE),
+        verdict_of(fastest < 0.5 * FRAME_RATE),
         "an upper bound of the tail's rate lies below half the frame rate",
         rate=FRAME_RATE,
     )
@@ -91,7 +92,7 @@ def method(evidence: Evidence) -> Iterator[Claim]:
     yield claim_of(
         "eps",
         f"pi sqrt(e)/2 = {EXACT_EPS_CONSTANT:.5f}, {100 * difference:.1f} % less",
-        _verdict(abs(difference) < 0.01),
+        verdict_of(abs(difference) < 0.01),
         "rounded from Lighthill's cut-off; the printed value is the default, the exact one an option",
         eps=PRINTED_EPS_CONSTANT,
     )
@@ -107,10 +108,6 @@ def method(evidence: Evidence) -> Iterator[Claim]:
         "undecidable",
         "a procedure, not a result" if evidence.observed else NO_RATES,
     )
-
-
-def _verdict(holds: bool) -> Verdict:  # noqa: FBT001 - a truth value is what it turns into words
-    return "agrees" if holds else "disagrees"
 
 
 _EQUAL = 0.05  # relative difference within which motor rates count as identical, as for observations
@@ -191,18 +188,15 @@ def _global_drop(readings: FrictionModelRuns) -> Iterator[Claim]:
         found = Judgement("depends", f"no table: {readings.missing}, and it speaks of the mean of all")
     computed = f"{_range(loss, ' %', 100.0)} over {len(wide)} of {readings.both.size} tails"
     yield claim_of("global_drop", computed, *found, by="", drop=100 * GLOBAL_DROP)
-    yield claim_of(
-        "slower",
-        f"the narrow channel takes {_range(1.0 - narrow / wide, ' %', 100.0)} of the speed",
-        *readings.verdict_on(readings.holds(wide - narrow)),
-    )
+    words = f"the narrow channel takes {_range(1.0 - narrow / wide, ' %', 100.0)} of the speed"
+    yield readings.claim("slower", words, wide - narrow)
 
 
 def _speeds(readings: FrictionModelRuns) -> Iterator[Claim]:
     speeds = readings.of("forward_velocity")
     rising, falling = np.diff(speeds, axis=1), -np.diff(speeds[:, :-1], axis=2)
     for key, steps in (("speed_wavelength", rising), ("speed_amplitude", falling)):
-        yield claim_of(key, _steps(steps), *readings.verdict_on(readings.holds(steps)))
+        yield readings.claim(key, _steps(steps), steps)
 
 
 def _steps(steps: Values) -> str:
@@ -215,35 +209,25 @@ def _steps(steps: Values) -> str:
 def _body_rotation(readings: FrictionModelRuns) -> Iterator[Claim]:
     rates = np.abs(readings.of("body_rotation_rate"))
     inside = np.minimum(rates - 10**-2.5 * Hz, 10**-0.5 * Hz - rates)
-    yield claim_of(
-        "body_rates",
-        _range(rates, " Hz", 1.0 / Hz),
-        *readings.verdict_on(readings.holds(inside)),
-    )
+    yield readings.claim("body_rates", _range(rates, " Hz", 1.0 / Hz), inside)
     errors = {
         name: np.abs(readings.of("modelled_body_rotation_rate", name) / readings.of("body_rotation_rate") - 1.0)
         for name in INFERRED_BY
     }
     within = np.minimum(*(BODY_ROTATION_ERROR - error for error in errors.values()))
-    yield claim_of(
-        "body_rate_errors",
-        ", ".join(f"{label(name)} misses by {_range(error, ' %', 100.0)}" for name, error in errors.items()),
-        *readings.verdict_on(readings.holds(within)),
-    )
+    words = ", ".join(f"{label(name)} misses by {_range(error, ' %', 100.0)}" for name, error in errors.items())
+    yield readings.claim("body_rate_errors", words, within)
 
 
 def _motor_rates(readings: FrictionModelRuns) -> Iterator[Claim]:
     rates = np.abs(readings.of("motor_rotation_rate"))
     apart = np.abs(rates[1] / rates[0] - 1.0)
-    yield claim_of(
-        "motor_equal",
-        f"{_range(rates, ' Hz', 1.0 / Hz)}; they differ by {_range(apart, ' %', 100.0)}",
-        *readings.verdict_on(readings.holds(_EQUAL - apart)),
-    )
+    words = f"{_range(rates, ' Hz', 1.0 / Hz)}; they differ by {_range(apart, ' %', 100.0)}"
+    yield readings.claim("motor_equal", words, _EQUAL - apart)
     rising = np.diff(rates, axis=1)
     falling, saturating = -np.diff(rates, axis=2), -np.diff(rising, axis=1)
     for name, steps in (("amplitude", falling), ("wavelength", rising), ("saturates", saturating)):
-        yield claim_of(f"motor_{name}", _steps(steps), *readings.verdict_on(readings.holds(steps)))
+        yield readings.claim(f"motor_{name}", _steps(steps), steps)
 
 
 def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
@@ -263,11 +247,8 @@ def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
     if motor is None:
         return
     rotor = motor.joint_rotor_friction
-    yield claim_of(
-        "friction_beyond_rotor",
-        f"B_eff {_range(found, ' N m s/rad')} by (18), {_range(found / rotor, ' times B_m')}",
-        *readings.verdict_on(readings.holds(found - 3.0 * rotor)),
-    )
+    words = f"B_eff {_range(found, ' N m s/rad')} by (18), {_range(found / rotor, ' times B_m')}"
+    yield readings.claim("friction_beyond_rotor", words, found - 3.0 * rotor)
     with np.errstate(invalid="ignore"):
         spread = np.fmax.reduce(found, axis=-1) / np.fmin.reduce(found, axis=-1) - 1.0
     known = spread[np.isfinite(spread)]
@@ -289,12 +270,8 @@ def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
     seen = readings.of("forward_velocity")
     missed = {name: (readings.of("modelled_forward_velocity", name) - seen)[readings.known] for name in INFERRED_BY}
     errors: dict[str, Values] = {name: np.sqrt(_of_tails(np.ma.mean, miss**2)) for name, miss in missed.items()}
-    yield claim_of(
-        "sbt_better",
-        ", ".join(f"{label(name)} {_range(error, ' mm/s', 1e3)}" for name, error in errors.items())
-        + " root mean square",
-        *readings.verdict_on(readings.holds((errors["rft"] - errors["sbt"])[None])),
-    )
+    words = ", ".join(f"{label(name)} {_range(error, ' mm/s', 1e3)}" for name, error in errors.items())
+    yield readings.claim("sbt_better", f"{words} root mean square", (errors["rft"] - errors["sbt"])[None])
     factors = readings.of("body_drag_factor", "sbt")
     for number, (channel, stated) in enumerate(BODY_DRAG_FACTORS.items()):
         of_tails = factors[number][readings.known[number]]
@@ -306,11 +283,8 @@ def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
 
 def _contact(readings: FrictionModelRuns) -> Iterator[Claim]:
     share = readings.of("contact_share")
-    yield claim_of(
-        "contact",
-        f"asperities touch for {_range(share, ' %', 100.0)} of the time",
-        *readings.verdict_on(readings.holds(np.minimum(share, 1.0 - share))),
-    )
+    words = f"asperities touch for {_range(share, ' %', 100.0)} of the time"
+    yield readings.claim("contact", words, np.minimum(share, 1.0 - share))
 
 
 def claims_of_study(dataset: xr.Dataset) -> list[Claim]:

@@ -18,6 +18,7 @@ from spirillum.papers.biorob2012.evidence import (
     Evidence,
     claim_of,
     fraction_between,
+    verdict_of,
 )
 from spirillum.papers.biorob2012.published import VELOCITY_DROPS
 from spirillum.papers.claim import Claim, Verdict
@@ -105,19 +106,16 @@ def velocity_drops(evidence: Evidence) -> Iterator[Claim]:
             there = int(extreme) == np.ravel_multi_index(tail, drops.shape)
             found = 1e3 * float(drops[tail])
             words = f"observed {found:.3f} mm/s; {'the' if there else 'not the'} {which} of all tails"
-            verdict: Verdict = "agrees" if there and abs(found / drop - 1.0) < 0.05 else "disagrees"
+            verdict = verdict_of(there and abs(found / drop - 1.0) < 0.05)
             yield claim_of("decrease", words, verdict, "observed speeds, within 5 %", which=which, **numbers)
             continue
         losses = {model: evidence.drop_per_motor_turn(model)[tail] for model in evidence.confined}
-        if not losses:
-            yield claim_of("decrease", "not computed", "undecidable", _NO_WALLS, which=which, **numbers)
-            continue
         words = ", ".join(
             f"{label(model)} {100 * loss:.1f} % (then {drop / loss:.2f} mm/s wide)" for model, loss in losses.items()
         )
-        open_reason = evidence.lacking("forward_velocity")
-        words = f"loss at equal motor rates {words}"
-        yield claim_of("decrease", words, "undecidable", open_reason, which=which, **numbers)
+        words, why = f"loss at equal motor rates {words}", evidence.lacking("forward_velocity")
+        words, why = (words, why) if losses else ("not computed", _NO_WALLS)
+        yield claim_of("decrease", words, "undecidable", why, which=which, **numbers)
 
 
 def global_drop(evidence: Evidence) -> Iterator[Claim]:
@@ -127,7 +125,7 @@ def global_drop(evidence: Evidence) -> Iterator[Claim]:
         wide, narrow = evidence.observation("forward_velocity")
         loss = 1.0 - narrow.sum() / wide.sum()
         words = f"observed {100 * loss:.1f} % over {wide.size} tails"
-        verdict: Verdict = "agrees" if abs(loss - GLOBAL_DROP) < 0.005 else "disagrees"
+        verdict = verdict_of(abs(loss - GLOBAL_DROP) < 0.005)
         yield claim_of("global_drop", words, verdict, "observed speeds, within 0.5 points", by="", drop=drop)
     for model in evidence.confined:
         yield claim_of("global_drop", *_computed_drop(evidence, model), by=f", by {label(model)}", drop=drop)
@@ -146,7 +144,7 @@ def global_drop(evidence: Evidence) -> Iterator[Claim]:
     yield claim_of(
         "slower",
         ", ".join(f"{label(model)} {fraction_between(found)} slower" for model, found in drops.items()),
-        "agrees" if all(np.nanmin(found) > 0 for found in drops.values()) else "disagrees",
+        verdict_of(all(np.nanmin(found) > 0 for found in drops.values())),
         f"{_EQUAL_RATES}; {', '.join(fitted)}: {_FITTED}" if fitted else _EQUAL_RATES,
     )
 
@@ -199,15 +197,10 @@ def trends(evidence: Evidence) -> Iterator[Claim]:
     loads = {
         m: evidence.free("tail_torque", m) / np.abs(evidence.free("tail_rotation_rate", m)) for m in evidence.models
     }
-    rising = [np.diff(load, axis=2) for load in loads.values()]
-    yield claim_of(
-        "torque_amplitude",
-        ", ".join(
-            f"{label(m)}: torque per rate rises in {_share(np.diff(load, axis=2))} steps" for m, load in loads.items()
-        ),
-        _always(np.concatenate([steps.ravel() for steps in rising])),
-        "torque per rate does not depend on the rate",
-    )
+    rising = {m: np.diff(load, axis=2) for m, load in loads.items()}
+    words = ", ".join(f"{label(m)}: torque per rate rises in {_share(steps)} steps" for m, steps in rising.items())
+    always = _always(np.concatenate([steps.ravel() for steps in rising.values()]))
+    yield claim_of("torque_amplitude", words, always, "torque per rate does not depend on the rate")
 
 
 def _share(steps: Values) -> str:
@@ -218,7 +211,7 @@ def _always(steps: Values) -> Verdict:
     """Whether a trend is satisfied in every step of the grid; undecided for a grid without steps."""
     if steps.size == 0:
         return "undecidable"
-    return "agrees" if bool(np.all(steps > 0)) else "disagrees"
+    return verdict_of(bool(np.all(steps > 0)))
 
 
 def body_rotation(evidence: Evidence) -> Iterator[Claim]:
@@ -236,7 +229,7 @@ def body_rotation(evidence: Evidence) -> Iterator[Claim]:
         seen = np.abs(evidence.observation("body_rate")) / Hz
         inside = np.nanmin(seen) > 10**-2.5 and np.nanmax(seen) < 10**-0.5
         words = f"observed {np.nanmin(seen):.3f} to {np.nanmax(seen):.3f} Hz"
-        yield claim_of("body_rates", words, "agrees" if inside else "disagrees", "observed rates")
+        yield claim_of("body_rates", words, verdict_of(bool(inside)), "observed rates")
     elif rates:
         yield claim_of(
             "body_rates",
@@ -257,9 +250,8 @@ def _rotation_errors(evidence: Evidence) -> Claim:
         found = _at_observed(evidence, "body_rotation_rate", model)
         worst[model] = float(np.nanmax(np.abs(found / seen - 1.0)))
     words = ", ".join(f"{label(model)} up to {100 * error:.0f} %" for model, error in worst.items())
-    verdict: Verdict = "agrees" if max(worst.values()) <= BODY_ROTATION_ERROR else "disagrees"
     how = "models at the observed tail rates, friction model 'rotor' or the first"
-    return claim_of("body_rate_errors", words, verdict, how)
+    return claim_of("body_rate_errors", words, verdict_of(max(worst.values()) <= BODY_ROTATION_ERROR), how)
 
 
 def _at_observed(evidence: Evidence, name: str, model: str) -> Values:
@@ -271,21 +263,15 @@ def _at_observed(evidence: Evidence, name: str, model: str) -> Values:
 
 def motor_rates(evidence: Evidence) -> Iterator[Claim]:
     """Motor rates: equal in both channels, falling with amplitude, rising with wavelength."""
-    observed = evidence.complete("motor_rate")
-    rates = (
-        {"observed": evidence.observation("motor_rate")}
-        if observed
-        else {label(model): evidence.free("motor_rotation_rate", model) for model in evidence.models}
-    )
-    how = "" if observed else "at equal friction "
-    reason = (
-        "observed rates"
-        if observed
-        else f"the paper found other friction for other amplitudes and channels; {evidence.lacking('motor_rate')}"
-    )
+    if observed := evidence.complete("motor_rate"):
+        rates, how, reason = {"observed": evidence.observation("motor_rate")}, "", "observed rates"
+    else:
+        rates, how = {label(m): evidence.free("motor_rotation_rate", m) for m in evidence.models}, "at equal friction "
+        other = "the paper found other friction for other amplitudes and channels"
+        reason = f"{other}; {evidence.lacking('motor_rate')}"
 
     def verdict(holds: bool) -> Verdict:  # noqa: FBT001 - a truth value is what it turns into words
-        return ("agrees" if holds else "disagrees") if observed else "undecidable"
+        return verdict_of(holds) if observed else "undecidable"
 
     apart = {name: float(np.nanmax(np.abs(found[1] / found[0] - 1.0))) for name, found in rates.items()}
     yield claim_of(
@@ -319,7 +305,7 @@ def effective_friction(evidence: Evidence) -> Iterator[Claim]:
     yield claim_of(
         "friction_amplitude",
         f"spread over amplitudes {by_amplitude:.2g}, over wavelengths {by_wavelength:.2g} N m s/rad ({label(model)})",
-        "agrees" if by_amplitude > by_wavelength else "disagrees",
+        verdict_of(by_amplitude > by_wavelength),
         "(18) at the observed rates",
     )
     smallest = float(np.nanmin(found))
@@ -327,7 +313,7 @@ def effective_friction(evidence: Evidence) -> Iterator[Claim]:
     yield claim_of(
         "friction_body",
         f"smallest B_eff {smallest:.2g} N m s/rad, {smallest / rotor:.0f} times B_m",
-        "agrees" if smallest > 3.0 * rotor else "disagrees",
+        verdict_of(smallest > 3.0 * rotor),
         "(18) at the observed rates",
     )
 
@@ -343,9 +329,6 @@ def model_comparison(evidence: Evidence) -> Iterator[Claim]:
         model: float(np.sqrt(np.nanmean((_at_observed(evidence, "forward_velocity", model) - seen) ** 2)))
         for model in ("sbt", "rft")
     }
-    yield claim_of(
-        "sbt_better",
-        ", ".join(f"{label(model)} {1e3 * error:.3g} mm/s" for model, error in errors.items()) + " root mean square",
-        "agrees" if errors["sbt"] < errors["rft"] else "disagrees",
-        "models at the observed tail rates",
-    )
+    words = ", ".join(f"{label(model)} {1e3 * error:.3g} mm/s" for model, error in errors.items())
+    better = verdict_of(errors["sbt"] < errors["rft"])
+    yield claim_of("sbt_better", f"{words} root mean square", better, "models at the observed tail rates")

@@ -77,6 +77,11 @@ def claim_of(
     return Claim(row["statement"].format(**numbers), row["paper"].format(**numbers), computed, verdict, reason)
 
 
+def verdict_of(holds: bool) -> Verdict:  # noqa: FBT001 - a truth value is what it turns into words
+    """The verdict on a statement that holds or does not."""
+    return "agrees" if holds else "disagrees"
+
+
 class Evidence:
     """Quantities of a study's dataset in the notation of the paper (channels `wide` and `narrow`, tails in mm)."""
 
@@ -223,6 +228,10 @@ class FrictionModelRuns:
         names = self._movers(holds)
         shares = "; ".join(self._share(holds, name) for name in names)
         return Judgement("depends", f"{_joined(names)}: it holds in {count} of {total} readings, {shares}{lacking}")
+
+    def claim(self, key: str, computed: str, steps: Values) -> Claim:
+        """A statement that holds where all steps are positive, with its verdict."""
+        return claim_of(key, computed, *self.verdict_on(self.holds(steps)))
 
     def compare(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
         """The verdict on a stated number, SI; `scale` is the SI unit over the shown one."""
