@@ -69,6 +69,17 @@ def test_columns_stand_side_by_side(answer: Any) -> None:
         "quantity", "held", "low", "high", "trial", "steady",
     ]  # fmt: skip
     assert "trial: released, motor on after 60 s, mean over 20 s; contact assumed, not validated" in lines
+    (lab,) = (line for line in lines if line.startswith("in the lab"))
+    assert lab.endswith("swims as in trial, later as in steady; held is for a known gap and pitch")
+
+
+def test_an_answer_over_poses_alone_says_what_the_lab_shows() -> None:
+    """Of a robot in a tube; none without one, and none at a stated pose."""
+    band = sp.predict("biorob2012-wide", tail_rate="1 Hz").to_dict()
+    at_a_pose = sp.predict("biorob2012-wide", tail_rate="1 Hz", placement={"gap": "1 mm", "pitch": "0 deg"}).to_dict()
+    said = [[one for one in blocks_of(item) if str(one).startswith("in the lab")] for item in (band, at_a_pose)]
+    assert [len(lines) for lines in said] == [1, 0]
+    assert "mostly slower than at a pose" in said[0][0]
 
 
 def test_what_a_trial_does_not_have_has_its_reason(answer: Any) -> None:

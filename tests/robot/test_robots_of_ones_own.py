@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from tests.support.commands import run_command
 
 import spirillum as sp
 from spirillum.robot.batch import RobotBatch
@@ -32,6 +33,21 @@ def test_a_file_extends_a_file_beside_it(tmp_path: Path) -> None:
     path.write_text('extends = "../base.toml"\n[body]\nlength = "36 mm"\n', encoding="utf-8")
     (warning,) = sp.load(path).warnings
     assert warning == "body.mass = 9 g was measured before body.length changed; set it anew"
+
+
+def test_a_new_file_hears_what_it_took_from_its_base(tmp_path: Path) -> None:
+    """Fields that decide the motion and that neither it nor an option sets; none of a preset or a whole file."""
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "biorob2012-wide"\n[body]\ndiameter = "16 mm"\nmass = "9 g"\n', encoding="utf-8")
+    for command in ("check", "show"):
+        said = " ".join(run_command("robot", command, str(path), "--set", "tail.length=50mm").out.split())
+        taken = said.partition("taken from biorob2012-wide, to be set where yours differs: ")[2].partition("A ")[0]
+        assert taken.startswith("body.length 35 mm, coupling.diameter 6 mm, coupling.length 10 mm, tail.wire_diameter")
+        assert "tail.length" not in taken
+        assert "body.mass" not in taken
+        assert "taken from" not in run_command("robot", command, "biorob2012-narrow").out
+    assert run_command("robot", "new", str(tmp_path / "whole.toml")).code == 0
+    assert "taken from" not in run_command("robot", "check", str(tmp_path / "whole.toml")).out
 
 
 def test_chains_that_do_not_end_are_refused(tmp_path: Path) -> None:

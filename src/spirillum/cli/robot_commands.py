@@ -44,9 +44,11 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
 
     Example: `spirillum robot show biorob2012-narrow`
     """
-    from spirillum.robot.load import robot_answer
+    from spirillum.envelope import with_notes_last
+    from spirillum.robot.load import inherited, robot_answer
 
-    renderer.show(robot_answer(loaded_robot(robot, settings)), json=json)
+    answer = robot_answer(loaded_robot(robot, settings))
+    renderer.show(with_notes_last(answer, **inherited(robot, overrides_from(settings))), json=json)
 
 
 @robot_app.command("check", cls=NotedCommand)
@@ -56,15 +58,15 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     Example: `spirillum robot check biorob2012-wide`
     """
     from spirillum.envelope import envelope
-    from spirillum.robot.load import checked
+    from spirillum.robot.load import checked, inherited
     from spirillum.swimming.preparation import models_without_answer
 
     problems, warnings = checked(robot, overrides_from(settings))
+    content = {"robot": robot, "valid": not problems, "problems": list(problems)}
     if not problems:
+        content |= inherited(robot, overrides_from(settings))
         warnings = (*warnings, *models_without_answer(loaded_robot(robot, settings)))
-    renderer.show(
-        envelope("check", {"robot": robot, "valid": not problems, "problems": list(problems)}, warnings), json=json
-    )
+    renderer.show(envelope("check", content, warnings), json=json)
     if problems:
         raise typer.Exit(1)
 

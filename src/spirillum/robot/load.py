@@ -29,6 +29,11 @@ _WEIGHED = (
     *(f"body.{name}" for name in ("shape", "diameter", "length", "front", "rear", "fillet")),
     *(f"coupling.{name}" for name in ("diameter", "length", "clearance")),
 )
+_DECIDING = (
+    *("body.diameter", "body.length", "body.mass", "coupling.diameter", "coupling.length"),
+    *("tail.length", "tail.wire_diameter", "channel.diameter", "fluid.viscosity", "motor.torque_constant"),
+)
+"""Fields that decide the motion, and that a robot file takes from its base unless it sets them."""
 # What belongs to a body of that size: a preset's value does not fit a robot that is scaled.
 _SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's", "drive.torques": "the motor's"}
 _SIZE = ("body.diameter", "body.length")
@@ -358,6 +363,18 @@ def robot_answer(robot: Robot) -> dict[str, Any]:
     }
     content = {"robot": robot.name, "fields": fields, "derived": derived}
     return envelope("robot", content, robot.warnings)
+
+
+def inherited(robot: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the base of a robot file and the deciding fields that it takes from it; empty without a base."""
+    table, _ = raw_table(robot)
+    if robot in shipped_robots() or (base := table.get("extends")) is None:
+        return {}
+    own = _touched(table).union(*(_touched(_nested(path, value)) for path, value in overrides.items()))
+    found = field_values(load(robot, **overrides))
+    there = {item.path: quantity(item.value, item.unit) for item in found if item.unit and item.value is not None}
+    taken = {path: there[path] for path in _DECIDING if path in there and path not in own}
+    return {"inherited": {"from": str(base), "fields": taken}} if taken else {}
 
 
 def checked(robot: str, overrides: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:

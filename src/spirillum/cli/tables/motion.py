@@ -57,6 +57,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         yield _over_poses(answer, "held" if released else "value")
     if "trial" in answer:
         yield from released_columns(answer)
+    yield from _in_the_lab(answer, released)
     for item in answer.get("published", ()):
         yield _compare_with_published(item)
     yield from files_of(answer, plot="plot")
@@ -71,6 +72,15 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         yield Detail(f"low and high: {100 * level:g} % interval of the robot's own motion")
         yield Detail(f"interval {answer['interval_of']}")
     yield from error_of(answer["error_estimate"])
+
+
+def _in_the_lab(answer: Answer, released: Sequence[str]) -> Iterator[str]:
+    """Which of the motions a robot has in an experiment."""
+    if "trial" in released:
+        later = ", later as in steady" if "steady" in released else ""
+        yield f"in the lab: a robot laid in its tube swims as in trial{later}; held is for a known gap and pitch"
+    elif "band" in answer:
+        yield "in the lab: a robot laid in its tube swims as in a trial or steady motion, mostly slower than at a pose"
 
 
 def _over_poses(answer: Answer, column: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from spirillum.cli.tables.parts import (
     cell,
     friendly,
     grid,
+    in_words,
     placement_of,
     quantity_grid,
     reason_of,
@@ -28,6 +29,7 @@ def robot(answer: Answer) -> Blocks:
     """Fields of `robot show`, and what follows from them."""
     fields = answer["fields"]
     yield f"{fields['name']}  {fields['description']}"
+    yield from _inherited(answer)
     rows = grid("fields", "field", "value", "unit")
     rows.columns[0].no_wrap, rows.columns[1].no_wrap = True, False  # values may be words
     for name, item in fields.items():
@@ -41,6 +43,14 @@ def robot(answer: Answer) -> Blocks:
         value, unit = friendly(item["value"], item["unit"])
         found.add_row(name.replace("_", " "), value, unit, item["meaning"])
     yield found
+
+
+def _inherited(answer: Answer) -> Iterator[str]:
+    """Deciding fields that the robot file does not set itself."""
+    if "inherited" in answer:
+        taken = answer["inherited"]
+        fields = ", ".join(f"{path} {in_words(item)}" for path, item in taken["fields"].items())
+        yield f"taken from {taken['from']}, to be set where yours differs: {fields}"
 
 
 def _quantity(item: Mapping[str, Any]) -> tuple[str, str]:
@@ -70,6 +80,7 @@ def check(answer: Answer) -> Blocks:
     """Text of `robot check`."""
     yield f"{answer['robot']}: {'valid' if answer['valid'] else 'not valid'}"
     yield from (f"problem: {problem}" for problem in answer["problems"])
+    yield from _inherited(answer)
 
 
 def export(answer: Answer) -> Blocks:
