@@ -76,7 +76,9 @@ def test_study_shows_its_ranking_first_and_stays_a_dataset() -> None:
     speeds = dataset["forward_velocity"].squeeze().values
     best = robots[int(speeds.argmax())]
     lines = str(dataset).splitlines()
-    assert lines[0] == f"Study: fastest: {best}, {1e3 * speeds.max():.4g} mm/s"
+    lead = 100 * (1.0 - speeds.min() / speeds.max())
+    fastest = f"Study: fastest: {best}, {1e3 * speeds.max():.4g} mm/s"
+    assert lines[0] == f"{fastest}, the next is {lead:.0f} % behind, the model's error is 31 %"
     assert [line.split()[0] for line in lines[3:5]] == [robots[number] for number in (-speeds).argsort()]
     assert dataset._repr_html_().startswith("<table><caption>fastest: ")
     part = dataset.sel(model="sbt")

@@ -29,10 +29,10 @@ def small() -> dict[str, object]:
 
 @pytest.fixture(scope="session")
 def planted(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Write what a model with a planted friction does as if it had been observed: five equal trials a robot."""
+    """Write what a model with a planted friction does as if observed: five trials a robot, equal to 1e-9."""
 
     def write(
-        study: dict[str, object] | None, model: str, friction: str, effective: float, spread: float = 0.0
+        study: dict[str, object] | None, model: str, friction: str, effective: float, spread: float = 1e-9
     ) -> Path:
         made = sp.study(study, models=[model], overrides={"friction.effective": f"{effective} N m s/rad"})
         chosen = made.sel(model=model, friction=friction)

@@ -72,7 +72,7 @@ def ranked(*speeds: float, error: float = np.nan) -> StudyRanking:
 def test_a_lead_below_the_errors_of_both_robots_is_said_and_drawn() -> None:
     """Each robot's table has an error of its own: the lead of one on another counts beyond the sum of both."""
     close = ranked(2.97e-4, 1e-4, 3e-4, error=0.008)
-    words = "by 1 %, within the model's error of 1.6 %"
+    words = "the next is 1 % behind, within the model's error of 1.6 %"
     assert close.message == f"fastest once settled: 25 x 2.5 mm, 0.3 mm/s, {words}"
     assert close.best[0].within == ("15 x 2.5 mm",)
     assert words in ranking_picture(close).title
@@ -82,7 +82,7 @@ def test_a_lead_below_the_errors_of_both_robots_is_said_and_drawn() -> None:
             drawn[tuple(line.get_ydata())] = line.get_markerfacecolor()
     assert len(set(drawn.values())) == len(drawn) == 3  # the best, one that is not told from it, the last
     far = ranked(2.9e-4, 1e-4, 3e-4, error=0.008)
-    assert far.message.endswith("by 3.3 %, the model's error is 1.6 %")
+    assert far.message.endswith("the next is 3.3 % behind, the model's error is 1.6 %")
     assert far.best[0].within == ()
     several = ranked(2.96e-4, 2.98e-4, 3e-4, error=0.008)
     assert several.message.endswith("within the model's error of 1.6 %, as 1 other is")

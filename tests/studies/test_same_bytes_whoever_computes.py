@@ -59,7 +59,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     store = tmp_path_factory.mktemp("interrupted") / "study.zarr"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(regions, "BLOCK", 7)
-        patch.setattr(study_store, "_summed", Mock(side_effect=KeyboardInterrupt))
+        patch.setattr(study_store, "note_attributes", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             sp.study(GRID, store=store)
     return store

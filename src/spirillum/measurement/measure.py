@@ -14,6 +14,7 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import checked_path, file_name
+from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.imported import check_track, read_track
 from spirillum.measurement.marks import (
     Marks,
@@ -103,10 +104,10 @@ def compared(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
-    """The trial, flagged if its track equals that of another one."""
+    """The trial, flagged if its track equals that of another one; readings by hand are coarse, and may agree."""
     x = trial.track.position[:, 0]
     twin = next((other for other in others if np.array_equal(other.track.position[:, 0], x, equal_nan=True)), None)
-    if twin is None or not np.isfinite(x).any():
+    if twin is None or not np.isfinite(x).any() or any(flag.name == BY_HAND for flag in trial.track.flags):
         return trial
     return trial.flagged(Flag.named(_COPY, name=twin.name))
 

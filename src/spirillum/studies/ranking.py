@@ -201,7 +201,7 @@ def best_in_words(best: Mapping[str, Any], size: str = "", *, held: bool = False
 
 def _lead_in_words(best: Mapping[str, Any]) -> str:
     """By how much the best robot leads, beside the error of the model between the two."""
-    lead = f"by {percent(best['lead']['value'])}"
+    lead = f"the next is {percent(best['lead']['value'])} behind"
     if "model_error" not in best:
         return f"{lead} (no error is stated)"
     within, error = best["within_error"], percent(best["model_error"]["value"])

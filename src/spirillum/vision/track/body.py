@@ -215,7 +215,7 @@ class BodyFinder:
                 grey_of(image[ends[1] : stops[1], ends[0] : stops[0]].astype(np.float32)), (0, 0), OUTLINE.blur
             )
             return _Part(np.asarray(grey)[..., None], np.array(ends, dtype=float), None, pose, places)
-        colours = colour_part(image, (*ends, *stops), OUTLINE.blur)
+        colours = colour_part(image, (ends[0], ends[1], stops[0], stops[1]), OUTLINE.blur)
         return _Part(grey_of(colours.picture), colours.origin, colours, pose, places)
 
     def _places(self, part: _Part, pose: BodyPose) -> tuple[Samples, Samples, Samples, Samples]:
