@@ -412,7 +412,7 @@ def validation_sources() -> str:
 
 def validation_case(name: str) -> str:
     """A validation case: figure, what it shows, its quantities, what the assumptions do, statements, source."""
-    from spirillum.papers.validation_figure import case_picture
+    from spirillum.results.validation import case_picture
 
     result = _validated()[name]
     case, picture = result.case, case_picture(result)
@@ -643,7 +643,7 @@ def renewed(text: str) -> str:
 
 def draw_validation() -> None:
     """Draw the figures of the validation cases."""
-    from spirillum.papers.validation_figure import case_picture
+    from spirillum.results.validation import case_picture
 
     folder = DOCS / "images" / "validation"
     folder.mkdir(parents=True, exist_ok=True)

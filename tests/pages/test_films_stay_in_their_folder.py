@@ -9,8 +9,7 @@ import pytest
 
 from spirillum.errors import InputError
 from spirillum.pages import video_store as films_module
-from spirillum.pages.measurement_session import MeasurementSession
-from spirillum.pages.setup_form import form_fields
+from spirillum.pages.measurement_session import MeasurementSession, form_fields
 from spirillum.pages.video_store import TooLargeError
 from spirillum.robot.load import load
 

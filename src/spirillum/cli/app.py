@@ -12,11 +12,10 @@ from typer.core import TyperGroup
 
 from spirillum.cli import renderer
 from spirillum.cli.calibrate_commands import calibrate, design, rank_models, suggest
-from spirillum.cli.control_commands import control, remote
 from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
 from spirillum.cli.inputs import check_apart, overrides_from, refuse_conflicts
 from spirillum.cli.measurement_commands import measure, observations_app, render, setup_app, track, virtual_experiment
-from spirillum.cli.motion_commands import magnetic_sweep, settle, simulate
+from spirillum.cli.motion_commands import control, magnetic_sweep, remote, settle, simulate
 from spirillum.cli.robot_commands import export, prepare, robot_app, validate
 from spirillum.cli.shared_options import (
     NO_FORM,
@@ -92,7 +91,7 @@ def predict(request: Request, *, plot: Path | None = None, all_of_it: All = Fals
     from spirillum.kernels.native import run_together
     from spirillum.papers.biorob2012.published import other_tube, published_values
 
-    draw = renderer.picture(plot, "prediction.png", "spirillum.view.figures.prediction:prediction_figure")
+    draw = renderer.picture(plot, "prediction.png", "spirillum.view.figures.comparison:prediction_figure")
     with renderer.progress_bar(quiet=json) as progress:
         result = request(progress=progress)
         asked = {

@@ -1,4 +1,4 @@
-"""Measurement session of the page: uploaded videos, their setup, measurement and calibration.
+"""Measurement session of the page: uploaded videos, the form of their setup, measurement and calibration.
 
 All files lie in one temporary folder, under names that the page gives, and are removed with it.
 """
@@ -9,17 +9,17 @@ import atexit
 import math
 import shutil
 import threading
-from collections.abc import Mapping
-from contextlib import ExitStack
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.calibration.methods import METHODS
-from spirillum.errors import InputError, check_choice
+from spirillum.data_tables import rows_of
+from spirillum.errors import InputError, check_choice, clipped
 from spirillum.files import scratch_folder
 from spirillum.pages.job import BackgroundJob
-from spirillum.pages.setup_form import FORM, form_fields
 from spirillum.pages.video_store import VideoStore, plain, plain_names
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.model_options import CALIBRATED
@@ -31,6 +31,67 @@ if TYPE_CHECKING:
     from spirillum.arrays import Samples
     from spirillum.vision.camera.ruler import Lines
     from spirillum.vision.camera.scale import CalibratedCamera
+
+_LONGEST = 200  # characters of a field
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One field of the setup file."""
+
+    field: str
+    label: str
+    group: str
+    example: str  #: Placeholder of an empty field: its meaning, or an example.
+    note: str
+    choices: tuple[str, ...] = ()
+    number: bool = False  #: Whether it is a bare number, without a unit.
+    uncertain: bool = False  #: Whether it has a standard uncertainty in a field of its own.
+
+
+def _entries() -> Iterator[Entry]:
+    """The rows of `setup_form.csv`."""
+    for row in rows_of("pages/setup_form.csv"):
+        words: Any = {name: row[name] for name in ("field", "label", "group", "example", "note")}
+        yield Entry(
+            **words, choices=tuple(row["choices"].split()), number=row["number"] != "", uncertain=row["uncertain"] != ""
+        )
+
+
+FORM = tuple(_entries())  #: Fields of the form, without the robot's file.
+
+_NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
+_KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}
+
+
+def form_fields(given: Mapping[str, Any], robots: tuple[str, ...]) -> dict[str, Any]:
+    """Fields of a setup from a form or a file, without empty ones."""
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        if name != "robot.file" and name not in _KNOWN:
+            raise InputError(f"{str(name)[:60]} is no field of this form; allowed: {', '.join(sorted(_KNOWN))}")
+        if isinstance(value, list) and name == "robot.stripes":
+            value = ", ".join(map(str, value))  # noqa: PLW2901
+        known = isinstance(value, (str, int, float)) and not isinstance(value, bool)
+        text = str(value).strip() if known else clipped(value)
+        if not known or len(text) > _LONGEST or not text.isprintable():
+            raise InputError(f"{name} = {text[:60]!r}; allowed: a text of at most {_LONGEST} printable characters")
+        if name == "robot.file" and text not in robots:
+            raise InputError(f"robot.file = {text[:60]!r}; allowed: {', '.join(robots)}")
+        if text:
+            found[name] = _typed(name, text)
+    return found
+
+
+def _typed(name: str, text: str) -> Any:
+    if name == "robot.stripes":
+        return [part.strip() for part in text.split(",") if part.strip()]
+    if name in _NUMBERS:
+        with suppress(ValueError):
+            number = float(text.replace(",", "."))
+            if math.isfinite(number):  # JSON has no others; as text its field refuses it
+                return number
+    return text
 
 
 ROBOT_FILE, _SETUP = "robot.toml", "setup.toml"

@@ -18,12 +18,21 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from spirillum.errors import InputError
-from spirillum.pages.downloads import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate, Strangers
 from spirillum.pages.job import run_in_background
 from spirillum.pages.measurement_routes import session_routes
 from spirillum.pages.measurement_session import MeasurementSession
-from spirillum.pages.replay import LARGEST_RUN, replay_of_swimmer, replay_of_upload
+from spirillum.pages.replay import (
+    LARGEST_RUN,
+    MODULES,
+    asset,
+    command_line,
+    python_lines,
+    replay_of_swimmer,
+    replay_of_upload,
+    replay_page,
+    robot_file,
+)
 from spirillum.pages.simulation_thread import SimulationThread
 from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
 from spirillum.pages.video_store import TooLargeError, Uploads

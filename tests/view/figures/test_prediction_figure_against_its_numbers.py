@@ -5,7 +5,7 @@ import pytest
 from matplotlib.text import Text
 
 import spirillum as sp
-from spirillum.view.figures.prediction import prediction_figure
+from spirillum.view.figures.comparison import prediction_figure
 
 
 def test_marks_and_bars_are_those_of_the_answer() -> None:

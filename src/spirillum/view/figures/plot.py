@@ -26,13 +26,12 @@ from spirillum.robot.robot import Robot
 from spirillum.studies.ranking import can_be_ranked, ranking_of
 from spirillum.swimming.prediction import Prediction
 from spirillum.view.figures.calibration import calibration_figures
-from spirillum.view.figures.comparison import comparison_figure, ranking_picture
+from spirillum.view.figures.comparison import comparison_figure, prediction_figure, ranking_picture
 from spirillum.view.figures.control import control_figure
 from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure
 from spirillum.view.figures.measurement import measurement_figures
-from spirillum.view.figures.prediction import prediction_figure
 from spirillum.view.figures.release import settling_figure
 from spirillum.view.figures.robot import robot_figure
 from spirillum.view.figures.style import DPI, save_as, styled
