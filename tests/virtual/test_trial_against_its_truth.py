@@ -147,6 +147,18 @@ def test_pngs_hold_their_numbers_and_the_setup_their_pace(tmp_path: Path) -> Non
     assert json.loads(found.truth.read_text())["degradation"]["crf"] == 0
 
 
+def test_a_released_robot_rests_on_assumed_contact_and_hardly_moves(tmp_path: Path) -> None:
+    """Said of its video; a robot held at its pose swims four times as fast, and rests on nothing."""
+    run, camera = sp.simulate("biorob2012-wide", timing={"duration": "0.5 s"}), {"size": (160, 120), "fps": 5.0}
+    found = render(None, tmp_path / "a.mp4", run=run, camera=camera)
+    assert found.to_dict()["assumption"] == "contact assumed, not validated"
+    (said,) = (note for note in found.warnings if note.code == "slow-film")
+    assert "in 0.5 s of video at real time; for a talk: `spirillum simulate`, then `film`" in said
+    held = render("biorob2012-wide", tmp_path / "b.mp4", trial={"duration": "0.5 s"}, camera=camera)
+    assert "assumption" not in held.to_dict()
+    assert not any(note.code == "slow-film" for note in held.warnings)
+
+
 def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
     run = sp.simulate(ROBOT, model="rft", motion="held", timing={"duration": "0.6 s"})
     found = render(None, tmp_path / "a.mp4", run=run, trial={"duration": "0.5 s"}, camera={"size": (160, 120)})

@@ -17,7 +17,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.preparation import AUTO, WALLED, choose_model
-from spirillum.swimming.released_motion import HELD, RELEASED
+from spirillum.swimming.released_motion import ASSUMPTION, HELD, RELEASED
 from spirillum.virtual.optics import tube_height
 from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
@@ -39,6 +39,7 @@ class TrialMotion:
     warnings: tuple[Note, ...] = ()
     reason: str = ""  #: Why the model was taken; empty where it was named.
     motion: str = HELD  #: `held`, `trial`, `run`, or `prescribed`.
+    assumption: str = ""  #: What the motion rests on, of a robot released in its tube.
 
 
 def steady_rates(
@@ -146,7 +147,8 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     source = f"run, {model}" if model else "run"
     step = float(np.abs(np.diff(trajectory.tail_phase)).max())
     notes = (Note.named("interpolated-poses", angle=np.degrees(step)),) if step > _LARGEST_STEP else ()
-    return TrialMotion(trajectory, source, notes, motion="run")
+    assumption = ASSUMPTION if "azimuth" in run and robot.channel is not None else ""
+    return TrialMotion(trajectory, source, notes, motion="run", assumption=assumption)
 
 
 def _clearance(robot: Robot) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.display import DisplayMixin
+from spirillum.display import DisplayMixin, percent
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import (
@@ -35,6 +35,7 @@ from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
 from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.released_motion import HELD, RELEASED
+from spirillum.units import display_unit, show
 from spirillum.version import versions
 from spirillum.virtual.artifacts import (
     Degradation,
@@ -48,6 +49,7 @@ from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.motion import TrialMotion, motion_of, motion_of_run, motion_of_trial
 from spirillum.virtual.optics import VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
+from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, companion_paths, rate_quantities, setup_text, truth_dataset, truth_text
 
@@ -116,6 +118,7 @@ class _Pngs:
 
 
 _MOST_FRAMES = 200_000
+_SLOW = 3e-3  # share of its length that a robot swims in a second, below which an audience sees no motion
 _LEAST_DEPTH = 1e-6  # least distance of the stated axis from the floor and from the oil's surface, m
 
 
@@ -138,6 +141,7 @@ class VirtualTrial(DisplayMixin):
     warnings: tuple[Note, ...] = ()
     model_reason: str = ""  #: Why the model was taken; empty where it was named.
     motion: str = HELD  #: `held`, `trial`, `run`, or `prescribed`.
+    assumption: str = ""  #: What the motion rests on, of a robot released in its tube.
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""
@@ -157,6 +161,7 @@ class VirtualTrial(DisplayMixin):
             "height": self.size[1],
             "frames_per_second": self.fps,
             "seed": self.seed,
+            **({"assumption": self.assumption} if self.assumption else {}),
         }
         return envelope("virtual-trial", content, self.warnings)
 
@@ -274,8 +279,10 @@ def render(
         seed=seed,
         model_reason=shown.reason,
         motion=shown.motion,
+        assumption=shown.assumption,
         warnings=(
             *shown.warnings,
+            *_slowness(trajectory, robot),
             *out_of_picture(trajectory, robot, lens),
             *_unused_seed_note(seed, degradation, troubles),
         ),
@@ -308,6 +315,16 @@ def render(
         _write_frames(writer, frames, (kept, counted), camera.fps, progress)
         tell(progress, "render: writing", len(kept), len(kept))
     return written
+
+
+def _slowness(trajectory: TrialTrajectory, robot: Robot) -> list[Note]:
+    """A note on a video in which a robot hardly moves: it is none for an audience."""
+    way, length = float(np.ptp(trajectory.position[:, 0])), robot.derived()["robot_length"].value
+    if way > _SLOW * length * trajectory.duration:
+        return []
+    shown = show(way, display_unit(way, "m"))
+    seconds = f"{trajectory.duration:.3g} s"
+    return [Note.named("slow-video", way=shown, share=percent(way / length), seconds=seconds)]
 
 
 def _unused_seed_note(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:

@@ -122,6 +122,19 @@ def test_speed_that_is_left_open_shows_how_the_tail_turns(
     assert (fast.speed, fast.warnings) == (0.02, ())
 
 
+def test_a_film_in_which_the_robot_hardly_moves_names_a_speed(
+    free_robot: Any, run_of: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The largest one that shows how the tail turns, and none that does not."""
+    path, length = tmp_path / "run.mp4", free_robot.derived()["robot_length"].value
+    slow = run_of(free_robot, speed=2e-3 * length, tail=2 * np.pi * 0.4)  # a quarter of a turn a frame: at 6.25 times
+    (said,) = sp.film(slow, path, **SMALL).warnings
+    assert said.code == "slow-film"
+    assert "0.2 % of its length, in 1 s of film; `spirillum film` with a speed of 5 shortens it" in said
+    assert sp.film(slow, path, speed=5.0, fps=100, **{k: v for k, v in SMALL.items() if k != "fps"}).warnings == ()
+    assert sp.film(run_of(free_robot, speed=4e-3 * length, tail=2 * np.pi * 0.4), path, **SMALL).warnings == ()
+
+
 def test_interrupted_film_leaves_nothing_behind(free_robot: Any, run_of: Callable[..., Any], tmp_path: Path) -> None:
     def stop(_what: str, done: int, _total: int) -> None:
         if done == 3:

@@ -27,6 +27,7 @@ from spirillum.cli.tables.parts import (
     reason_of,
     released_columns,
     resting_pose,
+    sentences_of,
     series_rows,
     unsteady,
 )
@@ -248,6 +249,7 @@ def simulation(answer: Answer) -> Blocks:
     yield Detail(f"last 2/3 of run: over the last two thirds of {whole}, on or off")
     yield Detail(f"steady part: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
+    yield from sentences_of(answer, "slow-film")
 
 
 def _averages(title: str, answer: Answer) -> Table:

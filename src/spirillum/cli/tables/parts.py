@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.display import percent, rows_of
+from spirillum.notes import notes_in_answer
 from spirillum.units import display_unit, in_unit, speed_unit
 
 Answer = Mapping[str, Any]
@@ -159,6 +160,11 @@ _UNKNOWN = {
 def files_of(answer: Answer, **words: str) -> Iterator[str]:
     """A line for each file of an answer that was written, by its entry."""
     return (f"{what} in {answer[name]}" for name, what in words.items() if answer.get(name))
+
+
+def sentences_of(answer: Answer, code: str) -> Iterator[str]:
+    """The notes of a code, as lines that stand in the answer itself."""
+    return (note.sentence for note in notes_in_answer(answer) if note.code == code)
 
 
 def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]:

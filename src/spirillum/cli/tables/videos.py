@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, Blocks, Detail, cell, grid, quantity_grid, reason_of
+from spirillum.cli.tables.parts import Answer, Blocks, Detail, cell, grid, quantity_grid, reason_of, sentences_of
 from spirillum.display import percent
 from spirillum.measurement.statistics import ShownNumber, rounded_with_ends
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
@@ -36,6 +36,8 @@ def virtual_trial(answer: Answer) -> Blocks:
     true = {name: answer[name] for name in names}
     motion = f", {answer['motion']}" if answer["motion"] in ("held", "trial") else ""
     yield quantity_grid(f"{answer['robot']}: true motion, {answer['model']}{motion}", true)
+    yield from filter(None, [answer.get("assumption")])
+    yield from sentences_of(answer, "slow-film")
     yield from reason_of(answer)
 
 
@@ -44,6 +46,8 @@ def film(answer: Answer) -> Blocks:
     size, fps = f"{answer['width']}x{answer['height']} pixels", answer["frames_per_second"]
     length = f"{answer['duration']['value']:.3g} s at {fps} frames a second, speed x{answer['speed']:g}"
     yield f"{answer['file']}: {answer['robot']}, {answer['frames']} frames of {size}, {length}"
+    yield from filter(None, [answer.get("assumption")])
+    yield from sentences_of(answer, "slow-film")
 
 
 def show(answer: Answer) -> Blocks:

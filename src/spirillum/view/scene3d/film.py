@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.display import DisplayMixin
+from spirillum.display import DisplayMixin, percent
 from spirillum.dynamics.run_file import Poses, RobotPose, open_run, poses_of, robot_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
@@ -19,6 +19,7 @@ from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
 from spirillum.robot.robot import Robot
+from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.units import display_unit, show
 from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK, round_length
@@ -84,6 +85,7 @@ CAMERAS = ("auto", "fixed", "follow")  #: Motion of the camera; `auto`: it follo
 _ALONG = ("front", "rear")  # views that show the cross-section themselves
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
+_SLOW = 3e-3  # share of its length that a robot swims in a second of film, below which an audience sees no motion
 _LARGEST_TURN = 0.25  # largest part of a tail's turn between two frames at which its sense can be seen (aliasing)
 
 
@@ -100,7 +102,9 @@ class Film(DisplayMixin):
     speed: float  #: Time of the run over time of the video.
     follows: bool  #: Whether the camera follows the robot.
     turn_per_frame: float  #: Largest part of a turn of the tail between two frames.
+    travelled: float  #: How far the robot swims in the run, m.
     warnings: tuple[Note, ...]
+    assumption: str = ""  #: What the motion rests on, of a robot released in its tube.
 
     @property
     def duration(self) -> float:
@@ -121,6 +125,8 @@ class Film(DisplayMixin):
             "camera": "follow" if self.follows else "fixed",
             "duration": quantity(self.duration, "s"),
             "tail_turn_per_frame": quantity(2.0 * np.pi * self.turn_per_frame, "rad"),
+            "travelled": quantity(self.travelled, "m"),
+            **({"assumption": self.assumption} if self.assumption else {}),
         }
         return envelope("film", content, self.warnings)
 
@@ -171,19 +177,25 @@ def film(
     times = _frame_times(poses, fps, speed)
     follows = camera == "follow" or (camera == "auto" and poses.travelled > 0.5 * solids.length)
     turn, warnings = _aliasing(poses, times, speed)
+    warnings += _slowness(poses, fps, speed, solids.length)
+    released = "azimuth" in dataset and robot.channel is not None
     model = str(dataset.attrs.get("model", ""))[:60]
     words = {"title": robot.name, "comment": f"computed motion and geometry, {MARK}"}
     inset = None
-    if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
+    if released and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
     shots = _Shots(solids, poses, view, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
     with atomic_write(target) as temporary, video_writer(temporary, pixels, fps, words) as writer:
-        with closing(shots.images(times, _about(dataset, model), speed)) as images:
+        about = ", ".join(filter(None, (_about(dataset, model), ASSUMPTION if released else "")))
+        with closing(shots.images(times, about, speed)) as images:
             for number, image in enumerate(images):
                 tell(progress, "film", number, times.size)
                 writer.add(image)
         tell(progress, "film: writing", times.size, times.size)
-    return Film(target, robot, model, times.size, pixels, fps, speed, follows, turn, warnings)
+    return Film(
+        target, robot, model, times.size, pixels, fps, speed, follows, turn, poses.travelled, warnings,
+        assumption=ASSUMPTION if released else "",
+    )  # fmt: skip
 
 
 def _about(dataset: xr.Dataset, model: str) -> str:
@@ -304,11 +316,24 @@ def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:
 
 
 def _clear_speed(poses: Poses, fps: int) -> float:
-    """Real time, or the largest slower speed of 1, 2 or 5 times a power of ten at which the tail's turning is seen."""
+    """Real time, or a slower speed at which the tail's turning is seen."""
+    return min(_fastest(poses, fps), 1.0)
+
+
+def _fastest(poses: Poses, fps: int) -> float:
+    """The largest speed of 1, 2 or 5 times a power of ten at which the tail's turning is seen."""
     rate = float(np.abs(np.diff(poses.tail_angle) / np.diff(poses.time)).max()) / (2.0 * np.pi)
-    if rate <= _LARGEST_TURN * fps:
-        return 1.0
-    return max(round_length(_LARGEST_TURN * fps / rate), _SLOWEST)
+    return float(np.clip(round_length(_LARGEST_TURN * fps / max(rate, _SLOWEST)), _SLOWEST, _FASTEST))
+
+
+def _slowness(poses: Poses, fps: int, speed: float, length: float) -> tuple[Note, ...]:
+    """A note on a film in which the robot hardly moves, with a speed that shows more of it."""
+    fastest = _fastest(poses, fps)
+    if poses.travelled > _SLOW * length * poses.duration / speed or fastest < 2.0 * speed:
+        return ()
+    way, share = show(poses.travelled, display_unit(poses.travelled, "m")), percent(poses.travelled / length)
+    seconds = f"{poses.duration / speed:.3g} s"
+    return (Note.named("slow-film", way=way, share=share, seconds=seconds, fastest=fastest),)
 
 
 def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[Note, ...]]:
