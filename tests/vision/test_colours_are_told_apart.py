@@ -25,3 +25,13 @@ def test_painted_stripes_are_told_apart(lamp: tuple[float, ...]) -> None:
 def test_a_seal_of_one_colour_is_not(name: str) -> None:
     seen = samples(named_colours([name]), np.ones(3))
     assert not are_distinguishable(seen, colour_classes(seen, NAMES))
+
+
+def test_stripes_under_a_mirrored_lamp_are_no_glare() -> None:
+    painted = samples(named_colours(NAMES), np.full(3, 0.4))
+    bare = colour_classes(painted, NAMES)[0]
+    palette, _, glare = colour_classes(painted + 105.0, NAMES)
+    np.testing.assert_allclose(palette - 105.0, bare, atol=8.0)
+    assert are_distinguishable(painted + 105.0, (palette, palette, glare))
+    grey = samples(named_colours(["white"]), np.full(3, 0.4)) + 105.0
+    assert not are_distinguishable(grey, colour_classes(grey, NAMES))
