@@ -121,7 +121,7 @@ class BodyFinder:
         found: list[PoseFit] = []
         if self.seal is not None:  # what does not move along with the seal is not the body's
             found = self._learn_seal(parts, poses)
-            poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
+            poses = _smooth([new.pose if new.known else old for new, old in zip(found, poses, strict=True)], times)
         for turn in range(OUTLINE.learning_rounds if self.seal is None else SEAL.joint_rounds):
             stack = [self._profiles(part, pose) for part, pose in zip(parts, poses, strict=True)]
             self._learn_profiles(np.stack(stack))

@@ -29,6 +29,9 @@ class FollowingConstants:
     search_interval: int = 15  #: Frames between two searches of the whole picture for a robot that was lost.
     memory: int = 12  #: Frames from which the next place is predicted.
     largest_jump: float = 4.0  #: Largest accepted distance from the predicted position, pixels.
+    beside: float = 1.5
+    """Distance across the channel from where it should be from which on that place is compared, pixels: the sides of
+    stripes look like those of the body, and cross it as it turns."""
     gap: float = 3.0  #: Time between frames over the usual one from which the robot may have left its predicted path.
     sure_step: float = 1.0
     """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
@@ -123,13 +126,16 @@ class FrameTracker:
 
     def _placed(self, frame: Frame, guess: BodyPose | None) -> PoseFit:
         """Place the body near a predicted pose, else where it should be; a jump counts as not detected."""
-        found = None
+        found, expected = None, self._expected(frame.time)
         if guess is not None:
             found = self._after_a_gap(frame, guess) if self._is_after_a_gap(frame.time, guess) else None
             found = found or self._near(frame, guess)
-            if found.known:
+            far = FOLLOWING.beside * self.known.start.body.optics.length_per_pixel
+            if found.known and abs(found.pose.y - expected.y) <= far:
                 return found
-        again = self._near(frame, self._expected(frame.time))
+        again = self._near(frame, expected)
+        if found is not None and found.known and again.known:
+            return max(found, again, key=lambda one: one.share)
         return again if found is None or again.known else found
 
     def _near(self, frame: Frame, guess: BodyPose) -> PoseFit:
