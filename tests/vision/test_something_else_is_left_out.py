@@ -6,7 +6,7 @@ A robot at two places has no speed.
 import numpy as np
 import pytest
 
-from spirillum.vision.track.visibility import far_apart, something_else, something_else_flag
+from spirillum.vision.track.visibility import far_apart, marks_lost_flag, something_else, something_else_flag
 
 LENGTH, PIXEL = 0.04, 2.5e-4
 TIME = np.arange(150) / 30.0
@@ -92,3 +92,12 @@ def test_strays_other_edges_and_ways_that_nobody_saw_are_no_second_place() -> No
     unseen[50:100] = np.nan
     for x in (way()[:, 0], strays, edge, unseen, np.full(TIME.size, np.nan)):
         assert far_apart(TIME, x, LENGTH) == ()
+
+
+def test_an_outline_that_loses_the_marks_gives_nothing() -> None:
+    place, read = np.ones(30), np.where(np.arange(30) < 6, 0.1, np.nan)
+    [flag] = marks_lost_flag(place, read, np.full(30, np.nan))
+    assert "80 % of the frames" in flag.sentence
+    assert flag.frame == 29
+    assert {"forward_velocity", "body_rotation_rate", "tail_rotation_rate"} <= set(flag.spoils)
+    assert marks_lost_flag(place, read, np.full(30, 0.2)) == marks_lost_flag(place, np.full(30, 0.1), read) == ()

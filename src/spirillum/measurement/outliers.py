@@ -92,7 +92,7 @@ def outlying_trial(values: Sequence[float]) -> int | None:
 
 
 LEADING = 6  #: First frames that are left out; with three, ahead frames were left in, and nine cost more than they gave
-_FEWEST = 40  # fewest frames of a track from which they are left out
+_FEWEST = 30  # fewest frames of a track from which they are left out
 _BESIDE = 20  # frames that the first one is compared with
 _AHEAD = 1.5  # standard errors by which position and angles together lead. Chance leaves them out 14 times in 100.
 _MOST = 4.0  # standard errors that one of them counts at most

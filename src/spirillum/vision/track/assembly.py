@@ -37,6 +37,7 @@ from spirillum.vision.track.visibility import (
     cut_off,
     far_apart,
     gaps_of,
+    marks_lost_flag,
     sight_flags,
     something_else,
     something_else_flag,
@@ -144,14 +145,14 @@ def track_of(
         roll_flags = (*roll_flags, Flag.named("stripes-doubtful"))
     elif size_flags and any(flag.spoils for flag in even.flags):
         roll_flags = (*roll_flags, Flag.named("outline-and-stripes-off" if roll_error else "scale-does-not-fit"))
-    hand = known.wire.handedness()
     motion, pixel = RobotMotion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
-    seen_flags = (*seen_flags, *something_else_flag(other))
+    lost = marks_lost_flag(pose[:, 0], roll[:, 0], tail[:, 0], learnt=known.robot and known.wire.readable)
+    seen_flags = (*seen_flags, *something_else_flag(other), *lost)
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     agreement = _agreement(time, record, cut | other, pixel, outline.suspect)
     lag = math.hypot(agreement.drift, _colour_lag(position[:, 0], body), outline.drift * pixel)
     cuts, hops, motion = _jumps_of(motion, pixel, picture, body.robot.body.length)
-    glare, odd = learnt.glare.drift * pixel, contradictions(motion, body.robot, hand)
+    glare, odd = learnt.glare.drift * pixel, contradictions(motion, body.robot, known.wire.handedness())
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
@@ -186,7 +187,7 @@ def track_of(
         body_angle_drift=math.hypot(
             even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
         ),
-        tail_phase_drift=math.hypot(hops.phase, 2.0 * np.pi * lag / body.robot.tail.wavelength),
+        tail_phase_drift=math.hypot(hops.phase, 2.0 * np.pi * math.hypot(lag, glare) / body.robot.tail.wavelength),
         cues=agreement.cues,
         cue_drift=lag,
         sideways=np.where(cut | other, np.nan, [one.sideways for one in record.placed]),

@@ -22,7 +22,7 @@ from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, PoseFit
-from spirillum.vision.track.constants import VISIBILITY
+from spirillum.vision.track.constants import IDENTITY, VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places
 
 _THREADS = 2
@@ -203,6 +203,15 @@ def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
     if not found.any():
         return ()
     return (Flag.named("something-else-followed", count=found.sum(), share=100.0 * found.mean()),)
+
+
+def marks_lost_flag(place: Samples, roll: Samples, tail: Samples, learnt: float = 1.0) -> tuple[Flag, ...]:
+    """Flag a robot followed without stripes and tail, though the tail was read on a large share where it was learnt."""
+    followed = np.flatnonzero(np.isfinite(place))
+    bare = ~(np.isfinite(roll) | np.isfinite(tail))[followed]
+    if learnt <= IDENTITY.sure_share or not followed.size or bare.mean() <= 1.0 - IDENTITY.least_share:
+        return ()
+    return (Flag.named("marks-lost", int(followed[bare][-1]), share=100.0 * bare.mean()),)
 
 
 def far_apart(time: Samples, x: Samples, length: float) -> tuple[Flag, ...]:
