@@ -14,7 +14,7 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks, two_links
-from spirillum.dynamics.release import start_state
+from spirillum.dynamics.release import resting_state
 from spirillum.kernels import core
 from spirillum.robot.placement import Placement
 
@@ -50,7 +50,7 @@ def main() -> None:
         core.rates(dy, t, y, data, no_table)
         return dy.copy()
 
-    start, tolerance = start_state(robot, Placement(), lying=True), TwoLinks.tolerance
+    start, tolerance = resting_state(robot, links, Placement()), TwoLinks.tolerance
     scipy_time = best(
         lambda: solve_ivp(right_hand_side, (0.0, simulated), start, method="RK45", rtol=tolerance, atol=1e-11), 2
     )

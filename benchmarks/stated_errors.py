@@ -23,7 +23,7 @@ import spirillum as sp
 from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import robot_solution
-from spirillum.fluid.wire.stokeslets import Accuracy, Wire, wire_along
+from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline, cylinder_outline
 
@@ -151,8 +151,12 @@ def _resistance(wire: Wire, accuracy: Accuracy) -> np.ndarray:
 
 
 def _ring(ratio: float) -> Wire:
-    angle = np.linspace(0.0, 2.0 * np.pi, 721)
-    return wire_along(np.stack([0.0 * angle, np.cos(angle), np.sin(angle)], axis=1), ratio, closed=True)
+    """A ring of radius 1, its stations as far apart as those of other wires."""
+    count = int(np.ceil(2.0 * np.pi / (0.75 * np.exp(0.5) * ratio)))
+    angle = 2.0 * np.pi * np.arange(count) / count
+    points = np.stack([0.0 * angle, np.cos(angle), np.sin(angle)], axis=1)
+    tangents = np.stack([0.0 * angle, -np.sin(angle), np.cos(angle)], axis=1)
+    return Wire(points, tangents, np.full(count, 2.0 * np.pi / count), ratio)
 
 
 def times(*, baseline: bool) -> Row:

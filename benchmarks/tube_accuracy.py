@@ -32,7 +32,7 @@ from spirillum.fluid.tube.outer_resistance import matrix_of
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.tube import END_LOSS, solved
 from spirillum.fluid.wire.interaction import one_thread
-from spirillum.fluid.wire.stokeslets import wire_along
+from spirillum.fluid.wire.stokeslets import stations_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import with_resolution
 from spirillum.robot.outline import Outline, body_outline
@@ -254,7 +254,7 @@ def wire_rows(*, quick: bool) -> list[Row]:
         lines = []
         for length in lengths:
             x = np.linspace(-0.5 * length, 0.5 * length, 60)
-            wire = wire_along(np.stack([x, 0 * x, 0 * x], axis=1), b)
+            wire = stations_along(np.stack([x, 0 * x, 0 * x], axis=1), b)
             lines.append(
                 solve_unit_motions(Solids([], TubePose(1.0, 0.0), Fineness(tolerance=1e-5)), [(wire, 1)], offset)
             )

@@ -39,6 +39,7 @@ def posterior(discrepancy: Mapping[str, float], size: int = 400, spread: float =
         discrepancy={name: np.full(size, value) for name, value in discrepancy.items()},
         error={},
         friction=(),
+        friction_reading="",
     )
 
 

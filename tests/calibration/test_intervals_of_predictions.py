@@ -50,7 +50,6 @@ def test_intervals_hold_the_truth_of_tails_that_were_not_observed(fitted: Path) 
 
 def test_middle_and_limits_are_those_of_predictions_one_by_one(fitted: Path) -> None:
     """Without discrepancy, each draw is a robot with its own factors, predicted by itself."""
-    from dataclasses import replace
 
     from spirillum.fitted.posterior_file import read_posterior
     from spirillum.fluid.registry import find_swimmer_model
@@ -59,7 +58,7 @@ def test_middle_and_limits_are_those_of_predictions_one_by_one(fitted: Path) -> 
     posterior = read_posterior(fitted / "posterior.nc", "sbt")
     thin = {name: values[::50] for name, values in posterior.draws.items()}
     size = thin["body_drag"].shape[0]
-    certain = replace(posterior, draws=thin, discrepancy={}, friction=())
+    certain = posterior.model_copy(update={"draws": thin, "discrepancy": {}, "friction": ()})
     robot = certain.central(load(WIDE))
     found = intervals_of(robot, find_swimmer_model("sbt"), certain, tail_rate=None, friction="rotor")
     speeds = []

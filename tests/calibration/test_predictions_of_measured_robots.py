@@ -50,6 +50,7 @@ def known(size: int, tau: float, error: float, observed: dict[str, float], trial
         discrepancy={name: np.full(size, tau) for name in observed},
         error={name: np.full(size, error) for name in observed},
         friction=(),
+        friction_reading="",
         tails=(own | tail,),
     )
 

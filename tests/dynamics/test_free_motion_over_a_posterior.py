@@ -35,6 +35,7 @@ def posterior() -> PosteriorFile:
         discrepancy={},
         error={},
         friction=(),
+        friction_reading="",
     )
 
 

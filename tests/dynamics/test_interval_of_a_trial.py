@@ -117,6 +117,7 @@ def posterior() -> PosteriorFile:
         discrepancy={},
         error={},
         friction=(),
+        friction_reading="",
         answer="trial",
     )
 

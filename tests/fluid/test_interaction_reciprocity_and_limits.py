@@ -14,7 +14,7 @@ from spirillum.fluid.algebra import about_point, axial_entries, axis_rotation, j
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.slender import robot_solution
-from spirillum.fluid.wire.stokeslets import wire_along
+from spirillum.fluid.wire.stokeslets import stations_along
 from spirillum.robot.limits import all_hold, assembly_limits
 from spirillum.robot.outline import Arc, Outline
 
@@ -208,7 +208,7 @@ def test_sphere_and_wire_against_faxen() -> None:
     outline = Outline((Arc((0.0, 0.0), (1.0, 1.0), (0.0, np.pi)),), ())
     x = np.linspace(-0.5, 0.5, 50)
     curve = np.array([-3.0, 4.0, 2.0]) + np.stack([x, 0.3 * x, 0 * x], axis=1)
-    wire = wire_along(curve, 0.05)
+    wire = stations_along(curve, 0.05)
     solution = solve([(outline, 0)], [(wire, 1)], Discretisation(order=12, tolerance=1e-10))
     assert solution.asymmetry < 1e-10
     unit = np.zeros(12)

@@ -13,7 +13,7 @@ from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.wall import point_reflection, waves_between
 from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.sources import Sources
-from spirillum.fluid.wire.stokeslets import Wire, wire_along, wire_system
+from spirillum.fluid.wire.stokeslets import Wire, stations_along, wire_system
 from spirillum.kernels.core import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
 from spirillum.robot.tube_pose import TubePose
@@ -29,14 +29,14 @@ def capsule() -> Outline:
 
 def straight(x: float, length: float, radius: float) -> Wire:
     along = np.linspace(x - 0.5 * length, x + 0.5 * length, 60)
-    return wire_along(np.stack([along, 0 * along, 0 * along], axis=1), radius)
+    return stations_along(np.stack([along, 0 * along, 0 * along], axis=1), radius)
 
 
 def coil(radius: float = 0.05) -> Wire:
     """A short coil behind a ball of radius 0.4, in body axes."""
     xi = np.linspace(0.0, 0.8, 140)
     turn = 2 * np.pi * xi / 0.8
-    return wire_along(np.stack([-0.7 - xi, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), radius)
+    return stations_along(np.stack([-0.7 - xi, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), radius)
 
 
 def turned(wire: Wire, phase: float) -> Wire:

@@ -8,7 +8,7 @@ import pytest
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.tube.confined import UnitMotions, solve_unit_motions
 from spirillum.fluid.tube.solids import Fineness, Solids
-from spirillum.fluid.wire.stokeslets import Wire, wire_along
+from spirillum.fluid.wire.stokeslets import Wire, stations_along
 from spirillum.robot.outline import Arc, Outline, body_outline
 from spirillum.robot.tube_pose import TubePose
 
@@ -27,7 +27,7 @@ def coil(phase: float = 0.0, hand: float = 1.0) -> Wire:
     """Behind the body, in body axes: y = r cos(h k x + phase), z = r sin(h k x + phase)."""
     x = -0.7 - np.linspace(0.0, 0.8, 140)
     turn = hand * 2 * np.pi * x / 0.8 + phase
-    return wire_along(np.stack([x, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), 0.05)
+    return stations_along(np.stack([x, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), 0.05)
 
 
 @lru_cache(maxsize=4)

@@ -44,11 +44,11 @@ def points(factor: float) -> Samples:
 
 def interpolation(nodes: Samples, at: Samples) -> Samples:
     """Weights of the values at nodes for the polynomial through them, (at, nodes)."""
-    weights = np.ones((at.size, nodes.size))
-    for number, node in enumerate(nodes):
-        for other in np.delete(nodes, number):
-            weights[:, number] *= (at - other) / (node - other)
-    return weights
+    from scipy.interpolate import BarycentricInterpolator
+
+    if nodes.size == 1:
+        return np.ones((at.size, 1))
+    return np.asarray(BarycentricInterpolator(nodes, np.eye(nodes.size), rng=0)(at))
 
 
 @dataclass(frozen=True)

@@ -111,13 +111,6 @@ def read_flow(path: str | Path) -> Samples:
     return np.array(found) * (1.0, 1e-3)
 
 
-def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
-    """The state of a robot at rest in its initial pose, (19,)."""
-    _check(robot, placement)
-    offset = 0.0 if robot.channel is None else _pose(robot, placement, robot.channel, lying=lying).offset
-    return state_at(offset, start_phase(robot), placement.pitch or 0.0)
-
-
 def start_phase(robot: Robot) -> float:
     """Initial phase of the tail, rad: 0 for a right-handed one, for a left-handed one its mirror image.
 
@@ -190,7 +183,11 @@ def turning_rate(steady: Prediction) -> float:
 
 def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Samples:
     """The state of a robot at rest at its initial pose, (19,); a heavy one without a given gap starts low."""
-    start = start_state(robot, placement, lying=float(links.weight[: core.WEIGHT_MOMENT_BODY].sum()) > 0)
+    _check(robot, placement)
+    offset, lying = 0.0, float(links.weight[: core.WEIGHT_MOMENT_BODY].sum()) > 0
+    if robot.channel is not None:
+        offset = _pose(robot, placement, robot.channel, lying=lying).offset
+    start = state_at(offset, start_phase(robot), placement.pitch or 0.0)
     if not links.spots.size:
         return start
     film, rough = float(links.gaps(start)[0]), links.roughness

@@ -342,16 +342,10 @@ def _file(path: Path, dataset: xr.Dataset) -> dict[str, Any]:
         **dict(extremes(dataset)),
     }
     if across:
-        through = quantity(flow_rate(dataset), unit_of("flow_rate_through_plane"), direction=f"+{across[0]}")
-        found["flow_rate_through_plane"] = through
+        through = float(dataset[f"velocity_{across[0]}"].fillna(0.0).integrate(axes))  # solids count as at rest
+        unit = unit_of("flow_rate_through_plane")
+        found["flow_rate_through_plane"] = quantity(through, unit, direction=f"+{across[0]}")
     return found
-
-
-def flow_rate(plane: xr.Dataset) -> float:
-    """Flow rate through a plane, m^3/s, along the axis across it; solids count as at rest."""
-    axes = [str(name) for name in plane["inside"].dims]
-    (across,) = (axis for axis in "xyz" if axis not in axes)
-    return float(plane[f"velocity_{across}"].fillna(0.0).integrate(axes))
 
 
 def extremes(dataset: xr.Dataset) -> Iterator[tuple[str, Any]]:

@@ -159,7 +159,11 @@ def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
     was not fitted gets the middle of the fitted tails in its channel: they say more about it than the rotor's own B_m,
     which is a lower bound.
     """
-    changed = _with_fitted(robot, file.fitted)
+    values = {path: getattr(file.fitted, name) for name, path in _FIELDS.items()}
+    known = {path: value for path, value in values.items() if value is not None}
+    if robot.motor is None:
+        known = {path: value for path, value in known.items() if not path.startswith("motor.")}
+    changed = with_numbers(robot, known)
     factors = {
         model: min(entries, key=lambda entry: _distance(robot, entry)) for model, entries in file.calibration.items()
     }
@@ -176,9 +180,10 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
     """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in its channel."""
     if robot.channel is None or robot.motor is None or not entries:
         return None, ()
-    diameter = robot.channel.diameter
+    diameter, tail = robot.channel.diameter, robot.tail
     near = [entry for entry in entries if _is_same_size(diameter, entry.channel_diameter)]
-    own = [entry.effective for entry in near if _is_of(robot, entry)]
+    waves = [entry for entry in near if _is_same_size(tail.wavelength, entry.wavelength)]
+    own = [entry.effective for entry in waves if _is_same_size(tail.amplitude, entry.amplitude)]
     return own[0] if own else None, tuple(entry.effective for entry in near)
 
 
@@ -214,17 +219,6 @@ def _distance(robot: Robot, entry: Calibration) -> float:
     return float(sum(abs(np.log(value / fit)) for value, fit in pairs))
 
 
-def _is_of(robot: Robot, entry: FittedFriction) -> bool:
-    if robot.channel is None:
-        return False
-    pairs = (
-        (robot.channel.diameter, entry.channel_diameter),
-        (robot.tail.wavelength, entry.wavelength),
-        (robot.tail.amplitude, entry.amplitude),
-    )
-    return all(_is_same_size(value, fit) for value, fit in pairs)
-
-
 _FIELDS = {
     "wire_diameter": "tail.wire_diameter",
     "viscosity": "fluid.viscosity",
@@ -235,10 +229,3 @@ _FIELDS = {
     "friction": "friction.effective",
 }
 """Field of `FittedValues` to the field of a robot."""
-
-
-def _with_fitted(robot: Robot, fitted: FittedValues) -> Robot:
-    """The robot with fitted fields; a motor that it lacks stays away."""
-    values = {path: getattr(fitted, name) for name, path in _FIELDS.items() if getattr(fitted, name) is not None}
-    lacking = "motor." if robot.motor is None else " "
-    return with_numbers(robot, {path: value for path, value in values.items() if not path.startswith(lacking)})

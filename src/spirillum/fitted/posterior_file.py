@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Json
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 SCHEMA = "spirillum.posterior/1"
 _DRAWS = 1000
 _WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
-_TAIL = ("channel_diameter", "wavelength", "amplitude")
 _SMALLEST, _GREATEST = 1e-15, 1e12  # of a draw, SI
 _LARGEST_DISCREPANCY = 100.0
 _MAY_BE_ZERO = ("pitch",)
@@ -70,6 +69,11 @@ class _OfTail(_Table):
     wavelength: _Length
     amplitude: Annotated[float, Field(ge=0, lt=1e3)]
 
+    @property
+    def sizes(self) -> tuple[float, float, float]:
+        """What tells a tail in its channel apart, m."""
+        return self.channel_diameter, self.wavelength, self.amplitude
+
 
 class _Friction(_OfTail):
     value: _Number
@@ -87,12 +91,14 @@ class _Seen(_Table):
 _Quantity = Literal["advance", "turning", "motor_rate"]
 
 
-class _Tail(_OfTail):
+class ObservedTail(_OfTail):
+    """What was observed of a robot."""
+
     tail_rate: _Number | None = None
     seen: dict[_Quantity, _Seen]
     by_motor: bool
-    correlation: Annotated[float, Field(gt=-1, lt=1)]
-    floor: Annotated[float, Field(ge=1e-9, lt=1e3)]
+    correlation: Annotated[float, Field(gt=-1, lt=1)]  #: Of the errors of advance and turning.
+    floor: Annotated[float, Field(ge=1e-9, lt=1e3)]  #: Of all relative errors.
 
 
 class _Body(_Table):
@@ -104,60 +110,58 @@ class _Robot(_Table):
     body: _Body
 
 
-class PosteriorAttributes(_Table):
-    """Attributes of a posterior's file."""
+class _Fitted(_Table):
+    """What a posterior was fitted to."""
 
     model: Annotated[str, AfterValidator(_fitted_model)]
     observations: _Names
     synthetic: bool
+    channels: Annotated[tuple[_Length, ...], Field(min_length=1, max_length=1000)]
+    friction: Annotated[tuple[_Friction, ...], Field(max_length=100_000)]  #: B_eff tail by tail.
+    friction_reading: Literal["", "rotor", "paper"]  #: Reading of the friction under which it was inferred.
+    tails: Annotated[tuple[ObservedTail, ...], Field(max_length=100_000)] = ()
+    """Observations of every robot; none in older files."""
+    answer: Literal["held", "trial"] = "held"  #: Motion that was fitted: `held`, or a `trial`.
+
+
+_JSON = ("channels", "parameters", "friction", "quantities", "settings", "tails")  # attributes that are texts in a file
+
+
+class PosteriorAttributes(_Fitted):
+    """Attributes of a posterior's file."""
+
     converged: bool
-    channels: Json[Annotated[tuple[_Length, ...], Field(min_length=1, max_length=1000)]]
-    parameters: Json[Annotated[tuple[_Parameter, ...], Field(min_length=1, max_length=1000)]]
-    friction: Json[Annotated[tuple[_Friction, ...], Field(max_length=100_000)]]
-    friction_reading: Literal["", "rotor", "paper"]
-    quantities: Json[Annotated[tuple[_Quantity, ...], Field(max_length=10)]]
-    settings: Json[Annotated[tuple[_Robot, ...], Field(min_length=1, max_length=100_000)]]
-    tails: Json[Annotated[tuple[_Tail, ...], Field(max_length=100_000)]] = ()
-    answer: Literal["held", "trial"] = "held"
+    parameters: Annotated[tuple[_Parameter, ...], Field(min_length=1, max_length=1000)]
+    quantities: Annotated[tuple[_Quantity, ...], Field(max_length=10)]
+    settings: Annotated[tuple[_Robot, ...], Field(min_length=1, max_length=100_000)]
 
     @classmethod
     def of(cls, attributes: dict[str, Any]) -> PosteriorAttributes:
         """Attributes as they were read, with numbers of numpy as those of Python."""
         single = (name for name, value in attributes.items() if hasattr(value, "item") and value.size == 1)
-        return cls.model_validate({**attributes, **{name: attributes[name].item() for name in single}})
+        tables = {name: json.loads(attributes[name]) for name in _JSON if name in attributes}
+        return cls.model_validate({**attributes, **{name: attributes[name].item() for name in single}, **tables})
 
 
-@dataclass(frozen=True)
-class PosteriorFile:
+class PosteriorFile(_Fitted):
     """Draws of a posterior, thinned, with what they were fitted to."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
 
     source: str
     sha256: str
-    model: str
-    observations: str
-    synthetic: bool
-    channels: tuple[float, ...]
     body: tuple[float, float]  #: Diameter and length of the fitted body, m.
     draws: Mapping[str, Samples]  #: Parameter to (draws, channels), or (draws, 1).
     middle: Mapping[str, Samples]  #: Their medians before thinning, (channels,) or (1,), as in `calibration.toml`.
     discrepancy: Mapping[str, Samples]  #: Quantity to (draws,).
     error: Mapping[str, Samples]  #: Relative error of a trial, quantity to (draws,).
-    friction: tuple[Mapping[str, float], ...]  #: B_eff tail by tail, with `low` and `high`.
-    friction_reading: str = ""  #: Reading of the friction under which it was inferred.
-    tails: tuple[Mapping[str, Any], ...] = ()
-    """Observations of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`,
-    `stated`), `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in
-    older files."""
-    answer: str = "held"  #: Motion that was fitted: `held`, or a `trial`.
 
-    def measured(self, robot: Robot) -> Mapping[str, Any] | None:
+    def measured(self, robot: Robot) -> ObservedTail | None:
         """What was observed of a robot; None if it was not."""
         diameter = robot.channel.diameter if robot.channel else np.inf
         own = (diameter, robot.tail.wavelength, robot.tail.amplitude, robot.body.diameter, robot.body.length)
-        for tail in self.tails:
-            if np.allclose(own, (*(tail[key] for key in _TAIL), *self.body), rtol=1e-6, atol=0.0):
-                return tail
-        return None
+        alike = (tail for tail in self.tails if np.allclose(own, (*tail.sizes, *self.body), rtol=1e-6, atol=0.0))
+        return next(alike, None)
 
     @property
     def count(self) -> int:
@@ -172,7 +176,7 @@ class PosteriorFile:
     @property
     def tail_rate(self) -> float | None:
         """Median of the observed tail rates, rad/s, without sign; None where none is in the file."""
-        rates = [abs(rate) for tail in self.tails if (rate := tail.get("tail_rate")) is not None]
+        rates = [abs(rate) for tail in self.tails if (rate := tail.tail_rate) is not None]
         return float(np.median(rates)) if rates else None
 
     def acts_on(self, robot: Robot, *, walls: bool, friction: bool) -> bool:
@@ -227,7 +231,7 @@ class PosteriorFile:
         draws, discrepancy, error = (
             {name: values[kept] for name, values in part.items()} for part in (self.draws, self.discrepancy, self.error)
         )
-        return replace(self, draws=draws, discrepancy=discrepancy, error=error)
+        return self.model_copy(update={"draws": draws, "discrepancy": discrepancy, "error": error})
 
     def places(self, count: int) -> list[int]:
         """Indices of some draws, evenly spaced among them."""
@@ -261,10 +265,11 @@ class PosteriorFile:
     @property
     def frictions(self) -> tuple[FittedFriction, ...]:
         """The middle of B_eff, tail by tail."""
-        tails: list[dict[str, Any]] = [
-            {**{key: item[key] for key in _TAIL}, "effective": max(item["value"], 0.0)} for item in self.friction
-        ]
-        return tuple(FittedFriction.model_construct(**tail) for tail in tails)
+        names = set(_OfTail.model_fields)
+        return tuple(
+            FittedFriction.model_construct(**item.model_dump(include=names), effective=max(item.value, 0.0))
+            for item in self.friction
+        )
 
     def _column(self, name: str, channel: int, values: Mapping[str, Samples] | None = None) -> Samples:
         columns = (self.draws if values is None else values)[name]
@@ -282,10 +287,9 @@ class PosteriorFile:
         found |= self._of_place(robot, self.draws)
         for item in self.friction:
             keys = (diameter, robot.tail.wavelength, robot.tail.amplitude)
-            fitted = tuple(item[key] for key in _TAIL)
-            if np.allclose(keys, fitted, rtol=1e-6, atol=0.0) and np.isfinite(item["high"] - item["low"]):
-                spread = (item["high"] - item["low"]) / (2.0 * 1.96)
-                found["friction"] = np.maximum(item["value"] + spread * rng.normal(size=self.count), 0.0)
+            if np.allclose(keys, item.sizes, rtol=1e-6, atol=0.0) and np.isfinite(item.high - item.low):
+                spread = (item.high - item.low) / (2.0 * 1.96)
+                found["friction"] = np.maximum(item.value + spread * rng.normal(size=self.count), 0.0)
         own, others = friction_of_tails(robot, self.frictions)
         if own is None and others:
             found["friction"] = _of_another_tail(others, self.count, rng)
@@ -319,12 +323,6 @@ def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Sampl
             f"{name}\n".encode(errors="surrogatepass") + np.ascontiguousarray(values[name], dtype="<f8").tobytes()
         )
     return found.hexdigest()
-
-
-def _possible(name: str, values: Samples) -> bool:
-    """Whether draws of a parameter are inside its domain."""
-    least = 0.0 if name in _MAY_BE_ZERO else _SMALLEST
-    return bool(values.size and np.all((values >= least) & (values < _GREATEST)))
 
 
 def read_posterior(path: str | Path, *models: str, answer: str | None = "held") -> PosteriorFile:
@@ -376,27 +374,21 @@ def _read(path: Path, content: PosteriorAttributes, values: Mapping[str, Samples
         draws[name] = np.stack([flat[item.label][kept] for item in columns], axis=1)
         middle[name] = np.array([np.median(flat[item.label]) for item in columns])
     body = content.settings[0].body
-    if size < 2 or not all(_possible(name, array) for name, array in draws.items()):
+    least = {name: 0.0 if name in _MAY_BE_ZERO else _SMALLEST for name in draws}
+    if size < 2 or not all(np.all((array >= least[name]) & (array < _GREATEST)) for name, array in draws.items()):
         raise InputError(f"{path} holds draws that are no numbers, or impossible ones; allowed: {_WHAT}")
     sizes = [flat[f"{kind}_{name}"] for kind in ("discrepancy", "error") for name in content.quantities]
     if not all(np.all((array >= 0) & (array < _LARGEST_DISCREPANCY)) for array in sizes):
         raise InputError(f"{path} holds a discrepancy or an error that is none; allowed: {_WHAT}")
-    return PosteriorFile(
+    return PosteriorFile.model_construct(
+        **{name: getattr(content, name) for name in _Fitted.model_fields},
         source=f"{path.name} ({content.observations})",
         sha256=sha256,
-        model=content.model,
-        observations=content.observations,
-        synthetic=content.synthetic,
-        channels=content.channels,
         body=(body.diameter, body.length),
         draws=draws,
         middle=middle,
         discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in content.quantities},
         error={name: flat[f"error_{name}"][kept] for name in content.quantities},
-        friction=tuple(item.model_dump() for item in content.friction),
-        friction_reading=content.friction_reading,
-        tails=tuple(item.model_dump() for item in content.tails),
-        answer=content.answer,
     )
 
 

@@ -28,14 +28,6 @@ def _off(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
     return np.zeros(len(seen) if task.on_off else (len(seen), 1))
 
 
-def _bang_bang(seen: np.ndarray, _task: TaskEnvironment) -> np.ndarray:
-    return (seen[:, 0] > 0).astype(np.int64)
-
-
-def _lead(seen: np.ndarray, _task: TaskEnvironment) -> np.ndarray:
-    return (seen[:, 0] > _LEAD * seen[:, 1]).astype(np.int64)
-
-
 def _own(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
     return np.full((len(seen), 1), task.plants.axial.duty)
 
@@ -47,7 +39,11 @@ def _integral(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
 
 
 RULES: Mapping[type[TaskEnvironment], Mapping[str, Rule]] = {
-    StopAt: {"nothing": _off, "bang-bang": _bang_bang, "lead": _lead},
+    StopAt: {
+        "nothing": _off,
+        "bang-bang": lambda seen, _task: (seen[:, 0] > 0).astype(np.int64),
+        "lead": lambda seen, _task: (seen[:, 0] > _LEAD * seen[:, 1]).astype(np.int64),
+    },
     HoldSpeed: {"nothing": _off, "always-on": _own, "integral": _integral},
 }
 """Rules by task and name, from what is seen to actions."""

@@ -12,18 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.core import (
-    FILM_BODY,
-    FILM_ENTRIES,
-    FILM_INTERVALS,
-    FILM_SECOND_INTERVALS,
-    FILM_SIZE,
-    FILM_YAWS,
-    MOTIONS,
-    contact_offset_of,
-    largest_yaw,
-    stretched_yaw,
-)
+from spirillum.kernels import core
 
 ORDER = (2, 4, 0, 1, 5, 3)
 """Order of the motions (U, Omega) in the factors: those that the film resists most come first, even ones before odd."""
@@ -35,30 +24,29 @@ def has_head(table: Samples, size: int, radius: float) -> bool:
     return table.size >= size and bool(np.isfinite(table[:size]).all()) and math.isclose(table[0], radius)
 
 
+_COUNTS = [core.FILM_INTERVALS, core.FILM_SECOND_INTERVALS, core.FILM_YAWS]  # of a film: both coordinates, and yaws
+
+
 def shape_of(film: Samples) -> tuple[int, int, int, int]:
     """Shape of the coefficients of a film from its head, or from all of it: both coordinates, yaws, entries."""
-    return int(film[FILM_INTERVALS]) + 3, int(film[FILM_SECOND_INTERVALS]) + 3, int(film[FILM_YAWS]), FILM_ENTRIES
+    first, second, yaws = (int(count) for count in film[_COUNTS])
+    return first + 3, second + 3, yaws, core.FILM_ENTRIES
 
 
 def is_complete_film(film: Samples, radius: float) -> bool:
-    """Whether an array is a packed film in a tube of this radius: the loops below check no index.
-
-    Args:
-        film: of any numbers.
-        radius: R of the tube, m.
-    """
-    if not has_head(film, FILM_SIZE, radius):
+    """Whether an array of any numbers is a packed film in a tube of this radius, m: the loops check no index."""
+    if not has_head(film, core.FILM_SIZE, radius):
         return False
-    counts = film[[FILM_INTERVALS, FILM_SECOND_INTERVALS, FILM_YAWS]]
-    if np.any(counts % 1.0) or counts.min() < 1 or counts.max() > _MOST_INTERVALS or not 0.0 < film[FILM_BODY] < radius:
+    counts, body = film[_COUNTS], film[core.FILM_BODY]
+    if np.any(counts % 1.0) or counts.min() < 1 or counts.max() > _MOST_INTERVALS or not 0.0 < body < radius:
         return False
-    values = film[FILM_SIZE:].view(np.float32)  # one more where their number is odd
+    values = film[core.FILM_SIZE :].view(np.float32)  # one more where their number is odd
     return values.size - math.prod(shape_of(film)) in (0, 1) and bool(np.isfinite(values).all())
 
 
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
 """Sign of each of the `MOTIONS` (U and Omega of the body, omega_m of the rotor, mean flow) in a mirror to the side."""
-PARAMETERS = MOTIONS * (MOTIONS + 1) // 2  #: Entries of a Cholesky factor.
+PARAMETERS = core.MOTIONS * (core.MOTIONS + 1) // 2  #: Entries of a Cholesky factor.
 STEEPEST = (math.radians(12.0), math.radians(8.0))
 """Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
 YAW_SLACK = 1.1  # of the largest yaw: the tail touches the glass a little beyond it
@@ -75,60 +63,35 @@ _YAW_LIMIT = 7  # numbers of `largest_yaw`
 
 
 def packed(
-    radius: float,
-    rings: Samples,
-    gaps: Samples,
-    up: Samples,
-    down: Samples,
-    most: Samples,
-    rest: Samples,
-    yaw_gaps: Samples,
-    yaw_pitches: Samples,
-    yaw_limit: Samples,
-    yawed: Samples,
-    film: Samples,
+    radius: float,  # R of the tube, m.
+    rings: Samples,  # Of `contact_offset`, (n, 4).
+    gaps: Samples,  # Nodes t, increasing, the last is 1.
+    up: Samples,  # Nodes f nose up, the first is 0.
+    down: Samples,  # Nodes f nose down, the first is 0.
+    most: Samples,  # Largest pitches nose up and nose down (positive) at the nodes t, (gaps, 2), rad.
+    rest: Samples,  # Parameters of the factor, see `Parts`; pitches as in `up`, then `down` without its first.
+    yaw_gaps: Samples,  # Nodes t of the yawed places.
+    yaw_pitches: Samples,  # Nodes of signed f of the yawed places, increasing, 0 one of them.
+    yaw_limit: Samples,  # Of `yaw_limit_of`, (7,).
+    yawed: Samples,  # Coefficients of the powers of the stretched yaw, see `Parts`.
+    film: Samples,  # Packed film.
 ) -> Samples:
-    """One array for `resistance_at`.
-
-    Args:
-        radius: R of the tube, m.
-        rings: of `contact_offset`, (n, 4).
-        gaps: nodes t, increasing, the last is 1.
-        up: nodes f nose up, the first is 0.
-        down: nodes f nose down, the first is 0.
-        most: largest pitches nose up and nose down (positive) at the nodes t, (gaps, 2), rad.
-        rest: parameters of the factor, (gaps, up + down - 1, phases, 36): Fourier coefficients 1, cos, sin, cos 2, ...;
-            pitches in the order of `up`, then `down` without its first.
-        yaw_gaps: nodes t of the yawed places.
-        yaw_pitches: nodes of signed f of the yawed places, increasing, 0 one of them.
-        yaw_limit: of `yaw_limit_of`, (7,).
-        yawed: coefficients of the powers of the stretched yaw, (yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36).
-        film: packed film.
-    """
+    """One array for `resistance_at`."""
     header = [radius, len(rings), gaps.size, up.size, down.size, rest.shape[2], yaw_gaps.size, yaw_pitches.size]
     nodes = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, yaw_limit)
     return np.concatenate([np.ravel(part) for part in (*nodes, rest, yawed, film)])
 
 
 def is_whole(table: Samples, radius: float) -> bool:
-    """Whether an array is a packed table of a tube of this radius: the loops below check no index.
-
-    Args:
-        table: of any numbers.
-        radius: R of the tube, m.
-    """
+    """Whether an array of any numbers is a packed table of a tube of this radius, m: the loops check no index."""
     if not has_head(table, _HEADER, radius):
         return False
     rings, gaps, up, down, phases, yaw_gaps, yaw_pitches = table[1:_HEADER]
     counts = np.array([rings, gaps, up, down, phases])
     turned = np.array([yaw_gaps, yaw_pitches])
     sizes = np.append(counts, turned)
-    if (
-        np.any(sizes % 1.0)
-        or counts.min() < 1
-        or max(gaps, up, down, *turned) > _MOST
-        or max(rings, phases) > _MOST_COEFFICIENTS
-    ):
+    whole = not np.any(sizes % 1.0) and counts.min() >= 1
+    if not whole or max(gaps, up, down, *turned) > _MOST or max(rings, phases) > _MOST_COEFFICIENTS:
         return False
     if phases % 2.0 == 0.0 or (turned.min() < 1 and turned.max() != 0):
         return False
@@ -151,16 +114,16 @@ def range_of(table: Samples) -> Range:
     gaps = int(table[_GAPS])
     at_most = at_gaps + gaps + int(table[_UP] + table[_DOWN])
     most = table[at_most : at_most + 2 * gaps].reshape(gaps, 2)
-    room = contact_offset_of(table, 0.0)
+    room = core.contact_offset_of(table, 0.0)
     levels = table[at_gaps : at_gaps + gaps] * room
-    return Range(levels, most[:, 0], most[:, 1], np.array([largest_yaw(table, room - gap, 0.0) for gap in levels]))
+    return Range(levels, most[:, 0], most[:, 1], np.array([core.largest_yaw(table, room - gap, 0.0) for gap in levels]))
 
 
 class Parts(NamedTuple):
     """What a packed table is made of."""
 
     nodes: Samples  #: Head, rings and nodes.
-    rest: Samples  #: (gaps, up + down - 1, phases, 36).
+    rest: Samples  #: Fourier coefficients 1, cos, sin, cos 2, ... of the factor, (gaps, up + down - 1, phases, 36).
     yawed: Samples  #: (yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36).
     film: Samples  #: Packed film.
 
@@ -191,7 +154,7 @@ def mirror_image(table: Samples) -> Samples:
     phi is one at pi - phi.
     """
     parts = parts_of(table)
-    row, column = np.tril_indices(MOTIONS)
+    row, column = np.tril_indices(core.MOTIONS)
     order = np.arange(parts.rest.shape[2])
     harmonic = (order + 1) // 2
     phases = np.where(order % 2 == 0, -1.0, 1.0) * (-1.0) ** harmonic  # of sin, of cos
@@ -201,15 +164,13 @@ def mirror_image(table: Samples) -> Samples:
     return parts._replace(rest=parts.rest * signs, yawed=parts.yawed * signs * yaws).packed()
 
 
-def yaw_limit_of(x: Samples, pitches: Samples, yaws: Samples, most: float) -> Samples:
-    """The numbers of `limited_yaw`, (7,), from largest yaws at some places.
-
-    Args:
-        x: offsets of the body's mid-length over R, (n,).
-        pitches: nose up, (n,), rad.
-        yaws: at which the tail is near the glass, (n,), rad.
-        most: largest yaw anywhere, rad.
-    """
+def yaw_limit_of(
+    x: Samples,  # Offsets of the body's mid-length over R, (n,).
+    pitches: Samples,  # Nose up, (n,), rad.
+    yaws: Samples,  # At which the tail is near the glass, (n,), rad.
+    most: float,  # Largest yaw anywhere, rad.
+) -> Samples:
+    """The numbers of `limited_yaw`, (7,), from largest yaws at some places."""
     p = np.sin(pitches)
     terms = np.stack([np.ones_like(x), p, p**2, x, x * p, x**2], axis=1)
     return np.append(np.linalg.lstsq(terms, np.sin(yaws) ** 2, rcond=None)[0], most)
@@ -220,7 +181,7 @@ def yaw_parts_at_nodes() -> Samples:
 
     The parts have the size of what is added; coefficients of so high powers cancel each other, and need more digits.
     """
-    s = np.array([stretched_yaw(share) for share in YAW_SHARES])[:, None]
+    s = np.array([core.stretched_yaw(share) for share in YAW_SHARES])[:, None]
     order = np.arange(1, YAW_ORDERS + 1)
     odd = order % 2 == 1
     found: Samples = np.concatenate([np.where(odd, s**order, 0.0), np.where(odd, 0.0, s**order)])

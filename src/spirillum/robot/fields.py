@@ -249,7 +249,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
             f"{field.rpartition('.')[0]} has too few entries" if entry else f"{field} is missing; it has to be given"
         ]
     if kind == "extra_forbidden":
-        allowed = list(_fields_at(model, names[:-1]))
+        allowed = list(_section_at(model, names[:-1]).model_fields)
         hint = f": {_OTHERWISE[field]}" if field in _OTHERWISE else did_you_mean(names[-1][:60], allowed)
         return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
     return [_refused(problem, field, _range_at(model, names))]
@@ -304,23 +304,19 @@ def _entries(count: Any) -> str:
     return "one entry" if count == 1 else f"{count} entries"
 
 
-def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
-    """Field names of the section that a location leads to."""
+def _section_at(model: type[BaseModel], names: Iterable[str]) -> type[BaseModel]:
+    """The section that a location leads to; the last one on its way where it leads nowhere."""
     for name in names:
-        if name in model.model_fields:
-            found = section_in(model.model_fields[name].annotation)
-            model = found or model
-    return tuple(model.model_fields)
+        info = model.model_fields.get(name)
+        model = (info and section_in(info.annotation)) or model
+    return model
 
 
 def _range_at(model: type[BaseModel], names: Sequence[str]) -> str:
     """Both bounds of the number that a location leads to; empty where there are not two."""
-    for name in names[:-1]:
-        info = model.model_fields.get(name)
-        model = (info and section_in(info.annotation)) or model
-    if not names or (info := model.model_fields.get(names[-1])) is None:
-        return ""
-    found = [getattr(item, name) for name in ("ge", "le") for item in all_metadata(info) if hasattr(item, name)]
+    info = _section_at(model, names[:-1]).model_fields.get(names[-1]) if names else None
+    metadata = [] if info is None else all_metadata(info)
+    found = [getattr(item, name) for name in ("ge", "le") for item in metadata if hasattr(item, name)]
     return f"{found[0]:g} to {found[1]:g}" if len(found) == 2 else ""
 
 

@@ -9,12 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from spirillum.robot.arguments import Options, in_range, one_of, whole
 from spirillum.robot.fields import AlsoReads, Factor, Length, Section, Text
 
-
-def _read_word(value: Any) -> Any:
-    """TOML reads an unquoted `true` as a truth value; here it is a word."""
-    return "true" if value is True else value
-
-
+_TRUE_AS_WORD = BeforeValidator(lambda value: "true" if value is True else value)  # TOML reads a bare `true` as True
 _TRUE = AlsoReads(lambda _: {"const": True})
 
 
@@ -46,7 +41,7 @@ class RftOptions(Section):
     """Local resistance coefficients; `brennen-winet` are those near a plane floor."""
     axis_height: Length | None = None
     """For `brennen-winet`: height of the tail's axis above the floor; unset: the body's radius (lying on it)."""
-    arc_element: Annotated[Literal["printed", "true"], BeforeValidator(_read_word), _TRUE] = "printed"
+    arc_element: Annotated[Literal["printed", "true"], _TRUE_AS_WORD, _TRUE] = "printed"
     """Arc element in (12): printed `(l/L_t) dx`, or the true `ds` on the tapered root."""
     row4: Literal["kept", "zeroed"] = "kept"
     """Row 4 of the tail's matrix in (15): kept (correct), or zeroed as printed, for comparison."""

@@ -101,7 +101,11 @@ def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
         return []
     g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
     known = batch.placement
-    gaps = _gaps(g, radius, known.pitch or 0.0, known.yaw) if "gap" in over else [known.gap]
+    gaps = [known.gap]
+    if "gap" in over:
+        room = largest_gap(g.body, radius, known.pitch or 0.0, known.yaw)
+        ends = [min(share * 0.5 * g.width, room) for share in GAP_BAND]
+        gaps = np.geomspace(ends[1], ends[0], PLACES_PER_FIELD).tolist()
     places = []
     for gap in gaps:
         assert gap is not None  # noqa: S101 - either open or given
@@ -110,12 +114,6 @@ def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
         pitches = np.linspace(0.0, steepest, PLACES_PER_FIELD).tolist() if "pitch" in over else [known.pitch]
         places += [known.model_copy(update={"gap": gap, "pitch": pitch}) for pitch in pitches]
     return places
-
-
-def _gaps(g: RobotGeometry, radius: float, pitch: float, yaw: float) -> list[float]:
-    room = largest_gap(g.body, radius, pitch, yaw)
-    ends = [min(share * 0.5 * g.width, room) for share in GAP_BAND]
-    return [float(gap) for gap in np.geomspace(ends[1], ends[0], PLACES_PER_FIELD)]
 
 
 @lru_cache(maxsize=4096)

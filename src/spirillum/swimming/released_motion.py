@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple, cast, get_args
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
+from spirillum.data_tables import rows_of
 from spirillum.envelope import quantity
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.model import SwimmerModel
@@ -66,15 +67,7 @@ State = Literal["steady", "orbits", "goes around", "changing"]
 or none of these within the turns that were followed.
 """
 
-END_STATES = {
-    "reaches-end": "nose or tail reached an end of the channel",
-    "left-table": "the robot tilted farther than its table of resistances is followed",
-    "standing": "the robot stands still: dry friction holds it, or its drive is off",
-    "orbit": "the robot went around the tube against its weight",
-    "ceiling": "the robot swims along the upper half of the tube",
-    "steady": "speed and tail rate are steady over turns of the tail",
-    "changing": "the motion still changes",
-}
+END_STATES = {row["state"]: row["meaning"] for row in rows_of("swimming/end_states.csv")}
 """Final states of a released robot, the first that applies, and what they mean."""
 
 

@@ -14,7 +14,7 @@ conditioning), as well known as the mean itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, cast, get_args
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError, check_choice
-from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.posterior_file import ObservedTail, PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, mean_resistances_along
 from spirillum.robot.batch import RobotBatch
@@ -47,19 +47,6 @@ def chebyshev_points(count: int, low: float, high: float) -> Samples:
     angle = (2.0 * np.arange(count) + 1.0) * np.pi / (2.0 * count)
     ends = np.log([low, high])
     found: Samples = np.exp(0.5 * ends.sum() - 0.5 * (ends[1] - ends[0]) * np.cos(angle))
-    return found
-
-
-def _weights(nodes: Samples, at: Samples) -> Samples:
-    """Weights of Chebyshev points for polynomial interpolation (barycentric form), with one more axis at the end."""
-    count = nodes.size
-    angle = (2.0 * np.arange(count) + 1.0) * np.pi / (2.0 * count)
-    signs = (-1.0) ** np.arange(count) * np.sin(angle)
-    distance = at[..., None] - nodes
-    hit = np.abs(distance) < 1e-14 * np.ptp(nodes)
-    raw = signs / np.where(hit, 1.0, distance)
-    raw = np.where(np.any(hit, axis=-1, keepdims=True), hit, raw)
-    found: Samples = raw / raw.sum(axis=-1, keepdims=True)
     return found
 
 
@@ -112,8 +99,11 @@ class AxialTable:
         """Interpolate a part at the draws, (draws, robots, 3, 3)."""
         if self.wires.size == 1:
             return part
+        from scipy.interpolate import BarycentricInterpolator
+
         wire = np.asarray(draws["wire_diameter"])
-        weights = _weights(np.log(self.wires), np.log(np.broadcast_to(wire, (wire.shape[0], part.shape[1]))))
+        between = BarycentricInterpolator(np.log(self.wires), np.eye(self.wires.size), rng=0)
+        weights = between(np.log(np.broadcast_to(wire, (wire.shape[0], part.shape[1]))))
         found: Samples = np.einsum("wja,ajkl->wjkl", weights, part)
         return found
 
@@ -225,24 +215,24 @@ def sampled_discrepancy(
     tail = None if robot is None else posterior.measured(robot)
     if tail is None:
         return found
-    names = [name for name in found if name in tail["seen"] and name in posterior.discrepancy and name in predicted]
+    names = [name for name in found if name in tail.seen and name in posterior.discrepancy and name in predicted]
     if not names:
         return found
     values = np.stack([_compared(name, predicted, tail) for name in names])
     spread = np.stack([posterior.discrepancy[name] for name in names]) * values
-    seen_of = [tail["seen"][name] for name in names]
+    seen_of = [tail.seen[name] for name in names]
     errors = np.stack(
         [
-            error_of_mean(posterior.error[name], one.get("stated", 0.0), one["scale"], one["trials"])
+            error_of_mean(posterior.error[name], one.stated, one.scale, one.trials)
             for name, one in zip(names, seen_of, strict=True)
         ]
     )
-    noise = np.einsum("qd,rd->dqr", errors, errors) * _correlations(names, float(tail["correlation"]))
-    floor = np.array([float(tail["floor"]) * one["scale"] for one in seen_of]) ** 2
+    noise = np.einsum("qd,rd->dqr", errors, errors) * _correlations(names, tail.correlation)
+    floor = np.array([tail.floor * one.scale for one in seen_of]) ** 2
     noise = noise + np.diag(floor)
     # Matheron's rule: a draw of the prior, moved by what its own observation differs from the one that was made.
     off = values * (np.stack([found[name] for name in names]) - 1.0)
-    seen = np.array([one["mean"] for one in seen_of])[:, None]
+    seen = np.array([one.mean for one in seen_of])[:, None]
     error = np.einsum("dqr,rd->qd", np.linalg.cholesky(noise), rng.normal(size=off.shape))
     whole = noise + spread.T[:, :, None] ** 2 * np.eye(len(names))
     gain = spread.T[:, :, None] ** 2 * np.linalg.inv(whole)
@@ -260,14 +250,14 @@ def error_of_mean(
     return np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
 
 
-def _compared(name: str, predicted: Mapping[str, Samples], tail: Mapping[str, object]) -> Samples:
+def _compared(name: str, predicted: Mapping[str, Samples], tail: ObservedTail) -> Samples:
     """What was compared: the advance is over the motor's rate where no tail rate was observed."""
-    if name == "advance" and tail["by_motor"]:
+    if name == "advance" and tail.by_motor:
         return predicted["advance"] / (1.0 - predicted["turning"])
     return predicted[name]
 
 
-def _correlations(names: list[str], correlation: float) -> Samples:
+def _correlations(names: Sequence[str], correlation: float) -> Samples:
     """Of the errors of advance and turning, which share their tail rate; none with the motor's rate."""
     found = np.eye(len(names))
     if "advance" in names and "turning" in names:

@@ -187,12 +187,6 @@ class Scenario:
             found = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
         return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
 
-    def _has_weight_or_place(self) -> bool:
-        """Whether it is known that the robot's weight keeps it on the floor, or where else it is."""
-        place = self.batch.placement
-        known = self.robot.body.mass is not None and self.robot.tail.density is not None
-        return known or place.gap is not None or place.eccentricity is not None
-
     def warnings(self, result: Swimming) -> list[Note]:
         """What to be careful about: calibration, accuracy, drive, what a free motion leaves out."""
         robot, model, batch, rate = self.robot, self.model, self.batch, self.tail_rate
@@ -200,6 +194,8 @@ class Scenario:
         if rate and not self.names_friction:
             known = robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
         assumed = "assumed-on-floor" if robot.has_body else "assumed-on-axis"
+        placed = batch.placement.gap is not None or batch.placement.eccentricity is not None
+        placed |= robot.body.mass is not None and robot.tail.density is not None  # its weight keeps it on the floor
         return [
             *(calibration_warnings(robot, model.name) if self.calibrated else ()),
             *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
@@ -207,7 +203,7 @@ class Scenario:
             *drive_warnings(known, model, self.friction, result, rate),
             *(self._left_out() if self.motion == "free" else ()),
             *([Note.named("in-a-flow")] if batch.placement.flow else []),
-            *([Note.named(assumed)] if model.placed and not self._has_weight_or_place() else []),
+            *([Note.named(assumed)] if model.placed and not placed else []),
         ]
 
     def _left_out(self) -> list[Note]:

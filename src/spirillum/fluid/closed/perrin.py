@@ -14,6 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Matrix6, PerRobot
 from spirillum.fluid.model import ResistanceModel
+from spirillum.fluid.reference_errors import STATED
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 
@@ -83,10 +84,7 @@ class Perrin(ResistanceModel):
     name = "perrin"
     title = "Perrin's spheroid"
     references = ("perrin1934", "happel1983")
-    known_error = (
-        "exact for spheroids and spheres; the inscribed spheroid has about 10 % less axial drag than one of "
-        "the capsule's own volume"
-    )
+    known_error = STATED["perrin"]
     parts = ("body",)
 
     def domain(self, batch: RobotBatch) -> list[Limit]:

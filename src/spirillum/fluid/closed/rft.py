@@ -17,14 +17,7 @@ from spirillum.fluid.algebra import both_parts, dyad, joint_locked, skew, two_pa
 from spirillum.fluid.closed.perrin import body_axial, body_matrix
 from spirillum.fluid.closed.sbt import thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import (
-    CHECKED,
-    SPEED_ERRORS,
-    WITHOUT_INTERACTION,
-    speed_note,
-    validation_note,
-    wall_clause,
-)
+from spirillum.fluid.reference_errors import CHECKED, SPEED_ERRORS, STATED, speed_note, validation_note, wall_clause
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.limits import Limit
@@ -189,14 +182,6 @@ def _spin_coefficient(batch: RobotBatch) -> PerRobot:
     return np.pi * batch.viscosity * batch.wire_diameter**2
 
 
-class _Integrand(NamedTuple):
-    """Axial entries per axial length."""
-
-    drag: Values
-    coupling: Values
-    rotation: Values
-
-
 def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
     """(B11, B14, B44) of eq. (12), averaged over the tail's phase where a floor makes them depend on it."""
     if batch.form.is_helix:
@@ -238,8 +223,8 @@ def _helix_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
     return far[0] + root[0], far[1] + root[1], far[2] + root[2]
 
 
-def _axial_integrand(batch: RobotBatch, w: Values) -> _Integrand:
-    """Axial entries per axial length where the envelope is r = B_o (1 - w)."""
+def _axial_integrand(batch: RobotBatch, w: Values) -> tuple[Values, Values, Values]:
+    """(B11, B14, B44) per axial length where the envelope is r = B_o (1 - w)."""
     c = local_coefficients(batch)
     normal, difference = c.normal[:, None], (c.tangential - c.normal)[:, None]
     r = batch.amplitude[:, None] * (1.0 - w)
@@ -262,7 +247,7 @@ def _axial_integrand(batch: RobotBatch, w: Values) -> _Integrand:
     spin = _spin_coefficient(batch)[:, None] * along2 if batch.options.rft.spin else 0.0
     arc = 1.0 / np.sqrt(along2) if batch.options.rft.arc_element == "true" else 1.0 / batch.arc_fraction[:, None]
     hand = batch.hand[:, None]
-    return _Integrand(arc * drag, arc * hand * coupling * r, arc * (rotation * r**2 + spin))
+    return arc * drag, arc * hand * coupling * r, arc * (rotation * r**2 + spin)
 
 
 class Rft(SwimmerModel):
@@ -271,24 +256,13 @@ class Rft(SwimmerModel):
     name = "rft"
     title = "RFT"
     references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "katz1975", "jeffrey1981", "perrin1934")
-    known_error = (
-        "against a resolved wire (25, 2.5 mm) the printed coefficients give about +56 % drag, +22 % thrust and "
-        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %, Lighthill's coefficients "
-        f"+89, +97 and -12 %; body and tail do not interact, which alone adds {WITHOUT_INTERACTION} % to the speed"
-    )
+    known_error = STATED["rft"]
     known_speed_error = 0.01 * SPEED_ERRORS["rft"]
     parts = ("body", "tail", "rotor", "robot")
 
     def stated_error(self, options: ModelOptions) -> str:
         """See `ResistanceModel.stated_error`; the near-floor coefficients were not compared with a resolved wire."""
-        chosen = options.rft.coefficients
-        if chosen != "brennen-winet":
-            return self.known_error
-        return (
-            f"the '{chosen}' coefficients have not been compared with a resolved wire here; sets differ from each "
-            "other by a factor of up to two in speed; body and tail do not interact, which alone adds "
-            f"{WITHOUT_INTERACTION} % to it"
-        )
+        return STATED["rft near a floor"] if options.rft.coefficients == "brennen-winet" else self.known_error
 
     def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.error_statement`; sets other than the printed one were compared with one tail only."""

@@ -20,14 +20,7 @@ from spirillum.data_tables import rows_of
 from spirillum.fluid.algebra import two_parts_axial
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import (
-    CHECKED,
-    SPEED_ERRORS,
-    WITHOUT_INTERACTION,
-    speed_note,
-    validation_note,
-    wall_clause,
-)
+from spirillum.fluid.reference_errors import CHECKED, SPEED_ERRORS, STATED, speed_note, validation_note, wall_clause
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 
@@ -156,11 +149,7 @@ class Sbt(SwimmerModel):
     name = "sbt"
     title = "SBT"
     references = ("lighthill1976", "biorob2012", "perrin1934")
-    known_error = (
-        "a long plain helix with uniform forces: end effects decay as one over the number of turns, thick-wire "
-        f"effects as eps^2; body and tail do not interact, which alone adds {WITHOUT_INTERACTION} % to the speed; "
-        "the wire's own spin, some 8 % of the axial torque, is an option"
-    )
+    known_error = STATED["sbt"]
     known_speed_error = 0.01 * SPEED_ERRORS["sbt"]
     parts = ("body", "tail", "rotor", "robot")
     axial_only = True

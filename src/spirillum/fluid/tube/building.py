@@ -86,9 +86,9 @@ class OnAxis:
         return fourier(factor_of(matrices, "on the tube's axis"))
 
     def _at(self, pitch: float) -> Samples:
-        apart = self.pitches[:, None] - self.pitches + np.eye(self.pitches.size)
-        ahead = np.where(np.eye(self.pitches.size, dtype=bool), 1.0, (pitch - self.pitches) / apart)
-        return np.tensordot(np.prod(ahead, axis=1), self.values, axes=1)
+        from scipy.interpolate import BarycentricInterpolator
+
+        return np.asarray(BarycentricInterpolator(self.pitches, self.values, rng=0)(pitch))
 
 
 def _about_x(angle: float) -> Samples:
@@ -305,8 +305,11 @@ def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
     if not places.stage.yawed:
         return kernel.packed(places.radius, places.rings, *parts, none, none, _NO_YAW, none, film)
     straight = kernel.packed(places.radius, places.rings, *parts, none, none, places.yaw_limit, none, film)
-    yawed = zip(_yawed(places), found[len(level) :], strict=True)
-    sides = [_both_sides(film, place, starts, *answers) for place, answers in yawed]
+    sides = []
+    for (t, _, pose, _), (own, image) in zip(_yawed(places), found[len(level) :], strict=True):
+        back = replace(pose, yaw=-pose.yaw)  # the nose to the other side
+        left = outer_coefficients(own, _film_of(film, pose), t, pose, starts)
+        sides.append((left, outer_coefficients(mirror_image(image), _film_of(film, back), t, back, starts)))
     for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
         pitch = float(f * (most[0] if f >= 0 else most[1]))
         for share in kernel.YAW_SHARES:
@@ -323,13 +326,6 @@ def _powers(middle: Samples, sides: Samples) -> Samples:
     """Coefficients of the powers of the stretched yaw from values at `YAW_SHARES`, (orders, phases, 36)."""
     odd, even = 0.5 * (sides[:, 0] - sides[:, 1]), 0.5 * (sides[:, 0] + sides[:, 1]) - middle
     return np.tensordot(np.linalg.inv(kernel.yaw_parts_at_nodes()), np.concatenate([odd, even]), axes=1)
-
-
-def _both_sides(film: Samples, place: _Place, starts: int, own: Samples, image: Samples) -> tuple[Samples, Samples]:
-    """Fourier coefficients of the rest's factor with the nose to the left and to the right."""
-    back = replace(place.pose, yaw=-place.pose.yaw)
-    left = outer_coefficients(own, _film_of(film, place.pose), place.t, place.pose, starts)
-    return left, outer_coefficients(mirror_image(image), _film_of(film, back), place.t, back, starts)
 
 
 def _interpolated(straight: Samples, pose: TubePose, count: int) -> Samples:

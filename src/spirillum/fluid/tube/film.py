@@ -231,7 +231,8 @@ class FilmTable:
         head[core.FILM_YAWS] = yaws
         places = np.concatenate([[0.0, 1 / 3], np.arange(1, intervals), [intervals - 1 / 3, intervals]])
         grids = [low + (high - low) * places / intervals for low, high in (head[7:9], head[10:12])]
-        etas = _yaw_nodes(yaws)
+        etas = np.cos((np.arange(yaws) + 0.5) * 0.5 * np.pi / (yaws - 0.5))  # clustered at 0: most robots are level
+        etas[-1] = _LEAST_YAW
         nodes = np.empty((places.size, places.size, yaws, core.FILM_ENTRIES))
         for i, first in enumerate(grids[0]):
             for j, second in enumerate(grids[1]):
@@ -257,13 +258,6 @@ class FilmTable:
         """Resistance at a pose, as of `film_resistance`, and the body's smallest gap, m."""
         out = np.empty((6, 6))
         return out, float(core.film_at(self.packed, e, p, psi, out))
-
-
-def _yaw_nodes(count: int) -> Samples:
-    """Yaw coordinates of the nodes, clustered at 0: most robots are level."""
-    found = np.cos((np.arange(count) + 0.5) * 0.5 * np.pi / (count - 0.5))
-    found[-1] = _LEAST_YAW
-    return np.asarray(found)
 
 
 def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: int) -> Samples:

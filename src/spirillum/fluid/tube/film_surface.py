@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.robot.outline import Arc, Outline, Piece, Segment, Smooth
+from spirillum.robot.outline import Arc, Outline, Segment, Smooth
 
 ROUNDED = 0.7  #: Angle of a rounded end that belongs to the lubrication film, rad.
 PATCH = 1.2  #: Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from.
@@ -62,9 +62,11 @@ class FilmBody:
     @classmethod
     def of(cls, outline: Outline) -> FilmBody:
         """Read an outline; of a profile what can near the wall, with circles for its ends or one spheroid."""
-        if any(isinstance(piece, Smooth) or _is_slanted(piece) for piece in outline.pieces):
+        straight = {k: piece for k, piece in enumerate(outline.pieces) if isinstance(piece, Segment)}
+        slanted = any(p.start[0] != p.end[0] and p.start[1] != p.end[1] for p in straight.values())
+        if slanted or any(isinstance(piece, Smooth) for piece in outline.pieces):
             return _of_profile(outline)
-        sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Segment) and p.start[1] == p.end[1] > 0]
+        sides = [k for k, p in straight.items() if p.start[1] == p.end[1] > 0]
         arcs = [piece for piece in outline.pieces if isinstance(piece, Arc)]
         if len(sides) == 1:
             side = outline.pieces[sides[0]]
@@ -78,10 +80,6 @@ class FilmBody:
         if arcs and len(arcs) == len(outline.pieces) and len({(p.centre, p.semi_axes[1]) for p in arcs}) == 1:
             return cls(arcs[0].semi_axes[1], abs(arcs[0].semi_axes[0]), (0.0, 0.0), (0.0, 0.0))
         return _of_profile(outline)
-
-
-def _is_slanted(piece: Piece) -> bool:
-    return isinstance(piece, Segment) and piece.start[0] != piece.end[0] and piece.start[1] != piece.end[1]
 
 
 def _of_profile(outline: Outline) -> FilmBody:

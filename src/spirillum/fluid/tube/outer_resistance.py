@@ -47,13 +47,10 @@ def matrix_of(full: Samples) -> Samples:
     return _RATES.T @ full @ _RATES
 
 
-def _solve(place: NodeSolution) -> list[Samples]:
+def _solve(numbered: tuple[int, NodeSolution]) -> list[Samples]:
     """Solve for every tail at one node: (phases, 8, 8), viscosity 1."""
+    place = numbered[1]
     return [matrix_of(full) for full in solved_together(place.tails, place.pose, place.fineness)]
-
-
-def _solve_numbered(numbered: tuple[int, NodeSolution]) -> list[Samples]:
-    return _solve(numbered[1])
 
 
 def solutions(
@@ -101,10 +98,10 @@ def _solutions(
     numbered, saved = list(enumerate(places)), "; completed poses are saved"
     known = [number for number, place in numbered if all_cached([place])]  # they take no time, and tell of no pace
     for number in known:
-        found[number] = _solve(places[number])
+        found[number] = _solve(numbered[number])
     tell(what, len(known), len(places))
     missing = _mixed([one for one in numbered if one[0] not in known])
-    answers = imap_unordered(_solve_numbered, missing, workers, besides=saved, single=True)
+    answers = imap_unordered(_solve, missing, workers, besides=saved, single=True)
     for done, ((number, _), answer) in enumerate(answers, start=len(known) + 1):
         found[number] = answer
         tell(what, done, len(places))

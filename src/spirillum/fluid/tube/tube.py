@@ -25,7 +25,7 @@ from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerR
 from spirillum.errors import MOST_MEMORY, InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import CHECKED, fit_clause, validation_note
+from spirillum.fluid.reference_errors import CHECKED, STATED, fit_clause, validation_note
 from spirillum.fluid.tube.cache import cached_or_computed, is_cached
 from spirillum.fluid.tube.confined import UnitMotions, share_basis, solve_unit_motions
 from spirillum.fluid.tube.domain import placement_answer, pose_limits, pose_of
@@ -183,10 +183,7 @@ class Tube(SwimmerModel):
     name = "tube"
     title = "tube"
     references = ("happel1983", "cortez2001", "pozrikidis1992", "dagan1982", "biorob2012")
-    known_error = (
-        "no calibrated factor: the walls are computed; the gap under the body and the body's pitch, which are seldom "
-        "known, decide much of the answer"
-    )
+    known_error = STATED["tube"]
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
     form = "direct"

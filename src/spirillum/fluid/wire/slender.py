@@ -15,7 +15,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.fluid.closed.sbt import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.reference_errors import CHECKED, validation_note, wall_clause
+from spirillum.fluid.reference_errors import CHECKED, STATED, validation_note, wall_clause
 from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
@@ -86,26 +86,13 @@ def _matrix(g: RobotGeometry, part: str, resolution: Discretisation) -> Samples:
     return matrix
 
 
-_STATED = {
-    "standard": (
-        "against a fully resolved wire and robot (tail 25, 2.5 mm) drag, thrust and axial torque of the tail are 0.6, "
-        "0.5 and 0.8 % low, speed and torque per turn 0.5 and 0.8 %; thrust up to 2.7 % off for short, wide coils; "
-        "with a coupling, torque is as good as its clearance; unbounded fluid, no channel walls"
-    ),
-    "high": (
-        "against fully resolved wires and a robot, drag, thrust and axial torque of the tail, speed and torque per "
-        "turn agree to 0.4 %; with a coupling, torque is as good as its clearance; unbounded fluid, no channel walls"
-    ),
-}
-
-
 class Slender(SwimmerModel):
     """The tail as a line of regularised Stokeslets, body and coupling as they are, and the flow between them."""
 
     name = "slender"
     title = "resolved"
     references = ("cortez2001", "cortez2012", "pozrikidis1992", "biorob2012")
-    known_error = _STATED["standard"]
+    known_error = STATED["slender standard"]
     known_speed_error = 0.005
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
@@ -116,7 +103,7 @@ class Slender(SwimmerModel):
 
     def stated_error(self, options: ModelOptions) -> str:
         """See `ResistanceModel.stated_error`."""
-        return _STATED[options.slender.accuracy]
+        return STATED[f"slender {options.slender.accuracy}"]
 
     def error_statement(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.error_statement`."""

@@ -19,7 +19,6 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
-from spirillum.errors import InputError
 from spirillum.fluid.algebra import dyad, skew
 
 Accuracy = Literal["standard", "high"]
@@ -66,64 +65,44 @@ def station_count(arc_length: PerRobot, radius: PerRobot) -> PerRobot:
     return np.ceil(np.maximum(arc_length / blob - 2.0 * _INSET, 0.0) / _SPACING) + 1.0
 
 
-def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: bool = False) -> Wire:
-    """The wire of radius a along points of a centreline, dense against its bends; a closed one ends where it starts."""
-    wire = stations_along(curve, radius, spacing, closed=closed)
-    near = closest_approach(wire, closed=closed)
-    if near < 2.0 * wire.radius:
-        raise InputError(
-            f"the wire comes within {1e3 * near:.3g} mm of another part of its centreline; allowed: more than its "
-            f"diameter, {2e3 * wire.radius:.3g} mm"
-        )
-    return wire
-
-
-def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
-    """Cut a centreline (n, 3) into stations at a spacing relative to the standard one; it may touch itself."""
+def stations_along(curve: Samples, radius: float, spacing: float = 1.0) -> Wire:
+    """The wire of radius a along points of a centreline (n, 3), dense against its bends; it may touch itself."""
     from scipy.interpolate import CubicSpline
 
     gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     apart = np.concatenate([[True], gaps > 1e-12 * np.sum(gaps)])
     curve = np.array(curve[apart])
-    if closed:
-        curve[-1] = curve[0]
     chord = np.concatenate([[0.0], np.cumsum(gaps[apart[1:]])])
-    spline = CubicSpline(chord, curve, axis=0, bc_type="periodic" if closed else "not-a-knot")
+    spline = CubicSpline(chord, curve, axis=0)
     node, weight = np.polynomial.legendre.leggauss(4)
     steps = np.diff(chord)
     speed = np.linalg.norm(spline(chord[:-1, None] + 0.5 * (1.0 + node) * steps[:, None], 1), axis=-1)
     arc = np.concatenate([[0.0], np.cumsum(0.5 * steps * (speed @ weight))])
-    at, lengths = _stations(float(arc[-1]), _BLOB * radius, spacing, closed=closed)
+    at, lengths = _stations(float(arc[-1]), _BLOB * radius, spacing)
     where = np.interp(at, arc, chord)
     tangents = spline(where, 1)
     tangents = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
     return Wire(spline(where), tangents, lengths, radius)
 
 
-def closest_approach(wire: Wire, *, closed: bool = False) -> float:
+def closest_approach(wire: Wire) -> float:
     """Least distance between stations further apart along the wire than half a tightest turn, m.
 
     Infinite where none is closer than the wire's diameter.
     """
     from scipy.spatial import cKDTree
 
-    total = float(np.sum(wire.lengths))
     at = np.cumsum(wire.lengths) - 0.5 * wire.lengths
     pairs = cKDTree(wire.points).query_pairs(2.0 * wire.radius, output_type="ndarray")
     along = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]])
-    along = np.minimum(along, total - along) if closed else along
     close = pairs[along > np.pi * wire.radius]
     distances = np.linalg.norm(wire.points[close[:, 0]] - wire.points[close[:, 1]], axis=1)
     return float(np.min(distances, initial=np.inf))
 
 
-def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tuple[Samples, Samples]:
+def _stations(length: float, blob: float, spacing: float) -> tuple[Samples, Samples]:
     """Positions of the stations along the arc, and the arc length of each."""
     step = _SPACING * spacing * blob
-    if closed:
-        count = int(np.ceil(length / step))
-        around: Samples = np.linspace(0.0, length, count, endpoint=False)
-        return around, np.full(count, length / count)
     inset = min(_INSET * blob, 0.5 * length)
     at: Samples = np.linspace(inset, length - inset, int(np.ceil((length - 2.0 * inset) / step)) + 1)
     ends = np.concatenate([np.zeros(1), 0.5 * (at[1:] + at[:-1]), np.full(1, length)])
