@@ -77,11 +77,7 @@ class Task(Options):
 
     @abstractmethod
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> Brief:
-        """Check the task against a robot, and compute what its controllers have to know.
-
-        Raises:
-            InputError: if the robot cannot do it.
-        """
+        """Check the task against a robot, and compute what its controllers have to know; refuse what it cannot do."""
 
     @abstractmethod
     def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:

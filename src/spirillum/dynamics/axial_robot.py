@@ -194,10 +194,7 @@ def axial_robot(
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> AxialRobot:
-    """A robot in axial motion, as in a run of `simulate` with motion `held`; arguments as of `predict`.
-
-    With a `flow` in the placement the imposed flow is an input, which starts there.
-    """
+    """A robot in axial motion, as in a held run of `simulate`; arguments as of `predict`, a `flow` is an input."""
     placed = Placement.of(placement)
     steady = predict(
         robot,

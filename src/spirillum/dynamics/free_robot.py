@@ -105,12 +105,10 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
 
 
 def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
-    """The circles on which the wire turns: where it has its full radius, of a helix behind its root, and at its tip.
-
-    The wire touches with its own small radius: its film stops it, and resists little before.
-    """
+    """The circles on which the wire turns: where it has its full radius, of a helix behind its root, and at its tip."""
     tail = robot.tail
     wire, root = 0.5 * tail.wire_diameter, 0.5 * robot.body.length + robot.coupling.length
+    # The wire touches with its own small radius: its film stops it, and resists little before.
     coefficient = _point(wire, _across(wire, channel), robot.fluid.viscosity)
     settled = 0.0 if tail.taper is None else min(3.0 / tail.taper, 0.5) * tail.length
     rings = [(-root - settled, tail.amplitude), (-root - tail.length, tail.amplitude)]
@@ -204,10 +202,7 @@ class FreeRobot(ABC):
         raise NotImplementedError  # no table, no range
 
     def step_sizes(self) -> Samples:
-        """Sizes of the state's components below which nothing matters; a small change of time; the time of a turn.
-
-        The small change of time is 0 where nothing depends on time; (21,).
-        """
+        """Sizes of the state that matter, a small time (0: nothing depends on it), and the time of a turn; (21,)."""
         resistance = self.drive[core.DRIVE_CONSTANT]
         current = self.drive[core.DRIVE_VOLTAGE] / resistance if resistance > 0 else 1.0
         found = np.ones(core.STATE_SIZE + 2)

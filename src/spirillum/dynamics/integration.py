@@ -121,11 +121,7 @@ def integrate(
     reach: Reach,
     progress: Progress | None = None,
 ) -> Trajectory:
-    """Integrate a robot's motion.
-
-    The run ends early where nose or tail reach the end of the tube, where a range of the robot's table is left, or when
-    it is interrupted; a spent battery drives no longer.
-    """
+    """Integrate a robot's motion, to the end of tube or table, or an interrupt; a spent battery drives no longer."""
     end = float(time[-1])
     going_on = isinstance(start, Checkpoint)
     begun = start if isinstance(start, Checkpoint) else Checkpoint(float(time[0]), first_step(robot), tuple(start))

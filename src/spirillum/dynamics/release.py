@@ -112,10 +112,7 @@ def read_flow(path: str | Path) -> Samples:
 
 
 def start_phase(robot: Robot) -> float:
-    """Initial phase of the tail, rad: 0 for a right-handed one, for a left-handed one its mirror image.
-
-    A tail that is one piece with the body is at 0, whatever its hand.
-    """
+    """Initial phase of the tail, rad: 0, of a left-handed one its mirror image unless it is one piece with the body."""
     return np.pi if robot.hand < 0 and robot.drive is not None and robot.drive.joint == "revolute" else 0.0
 
 
@@ -265,14 +262,12 @@ def released_state(robot: Robot, links: TubeRobot, placed: Placement, azimuth: f
 
 
 def state_at(offset: float, phase: float, pitch: float, yaw: float = 0.0, azimuth: float = 0.0) -> Samples:
-    """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, and its angles, rad.
-
-    The azimuth is that of the body's mid-length about +x from the lowest point of the tube. There the pitch raises the
-    nose from the wall, and the yaw turns it to +y.
-    """
+    """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, and its angles, rad."""
     from scipy.spatial.transform import Rotation
 
     state = np.zeros(core.STATE_SIZE)
+    # The azimuth is that of the body's mid-length about +x from the lowest point of the tube, where the pitch raises
+    # the nose from the wall, and the yaw turns it to +y.
     turned = Rotation.from_euler("XZY", [azimuth, yaw, -pitch])
     state[core.STATE_ATTITUDE : core.STATE_ATTITUDE + 4] = turned.as_quat(scalar_first=True)
     state[core.STATE_PHASE] = phase

@@ -177,11 +177,9 @@ class FixedPoint(NamedTuple):
 
 
 def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint | None:
-    """The fixed point to which the motion from a state leads, if it is found.
-
-    It is looked for with longer steps in time than those of a run, and settled with these.
-    """
+    """The fixed point to which the motion from a state leads, if it is found."""
     free = np.arange(0 if heavy else 1, 4)
+    # Looked for with longer steps in time than those of a run, and settled with these.
     chart = _Chart(replace(turns, tolerance=SEARCHING), state)
     near = _continued(chart, chart.coordinates(state), free, _FIRST_TURNS)
     if near is None:
@@ -221,12 +219,10 @@ class _Change(NamedTuple):
 
 
 def _continued(chart: _Chart, x: Samples, free: np.ndarray, turns: float) -> _Change | None:
-    """The fixed point of the return map to which coordinates, (4,), lead; None where the search fails.
-
-    Pseudo-transient continuation: implicit Euler steps over turns of the tail, more of them as the change of a turn
-    falls, and at last Newton's method (C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35:508, 1998). What dies out
-    within a turn, such as gaps in contact, does so in one turn after each step.
-    """
+    """The fixed point of the return map to which coordinates, (4,), lead; None where the search fails."""
+    # Pseudo-transient continuation: implicit Euler steps over turns of the tail, more of them as the change of a turn
+    # falls, and at last Newton's method (C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35:508, 1998). What dies out
+    # within a turn, such as gaps in contact, does so in one turn after each step.
     here = chart.change(x)
     for _ in range(_ROUNDS):
         if here is None:

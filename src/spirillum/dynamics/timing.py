@@ -131,11 +131,7 @@ class Timing(Options):
         return self if given else self.model_copy(update={"duration": TRIAL_DURATION})
 
     def timetable(self, turn: float, duty: float) -> Timetable:
-        """The times of a run.
-
-        A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
-        which of the two is rounded up.
-        """
+        """The times of a run; a sample that differs from a switching by rounding is at the switching."""
         end = duration_of(self.turns, turn, self.duration)
         switches = schedule(self.on, self.duty, duty, end)
         count = math.ceil(end / turn * self.samples_per_turn)

@@ -219,10 +219,7 @@ def with_interval(
     progress: Progress | None = None,
     discrepancy: Callable[[Sequence[TrialSample], Sequence[ReleasedMotion]], Mapping[str, Samples]] | None = None,
 ) -> ReleasedMotion:
-    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
-
-    With the factors of a fitted model's discrepancy only the quantities that it knows have intervals.
-    """
+    """Add the interval of the trial over its unknowns, of a discrepancy only for what it knows, and their shares."""
     if nominal.reason or not (unknowns or discrepancy):
         return nominal
     runs: list[ReleasedMotion] = []

@@ -153,12 +153,10 @@ def read_calibration(path: str | Path) -> CalibrationFile:
 
 
 def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
-    """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken.
-
-    A file without factors leaves the robot its own; factors for some models take the place of all. A tail whose B_eff
-    was not fitted gets the middle of the fitted tails in its channel: they say more about it than the rotor's own B_m,
-    which is a lower bound.
-    """
+    """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken."""
+    # A file without factors leaves the robot its own; factors for some models take the place of all. A tail whose B_eff
+    # was not fitted gets the middle of the fitted tails in its channel: they say more about it than the rotor's own
+    # B_m, which is a lower bound.
     values = {path: getattr(file.fitted, name) for name, path in _FIELDS.items()}
     known = {path: value for path, value in values.items() if value is not None}
     if robot.motor is None:

@@ -154,10 +154,8 @@ class Fit:
         return (NO_FIT if idle else self), idle
 
     def geometry_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[Note]:
-        """Whether fitted values act in another channel, or of a posterior on another body, than they were fitted to.
-
-        That of a model's own drag factors is `spirillum.swimming.scenario.calibration_warnings`.
-        """
+        """Whether fitted values act in another channel, or of a posterior on another body, than they were fitted to."""
+        # That of a model's own drag factors is `spirillum.swimming.scenario.calibration_warnings`.
         acting = (
             robot
             for robot in robots

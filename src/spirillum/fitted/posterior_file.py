@@ -276,15 +276,13 @@ class PosteriorFile(_Fitted):
         return columns[..., min(channel, columns.shape[-1] - 1)]
 
     def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
-        """Draws for one robot: those of the nearest channel, with their median (`central`), its pose, and B_eff.
-
-        That of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
-        with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
-        """
+        """Draws for one robot: those of the nearest channel, with their median (`central`), its pose, and B_eff."""
         diameter = robot.channel.diameter if robot.channel else np.inf
         nearest = nearest_channel(robot, self.channels)
         found = {name: self._column(name, nearest) for name in self.draws if name not in _PLACE}
         found |= self._of_place(robot, self.draws)
+        # B_eff is that of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
+        # with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
         for item in self.friction:
             keys = (diameter, robot.tail.wavelength, robot.tail.amplitude)
             if np.allclose(keys, item.sizes, rtol=1e-6, atol=0.0) and np.isfinite(item.high - item.low):

@@ -72,11 +72,7 @@ _Sizes: TypeAlias = dict[str, int]
 
 @cache
 def library() -> ctypes.CDLL:
-    """Return the compiled library, in its build for this processor.
-
-    Raises:
-        ImportError: It was not built, or for other processors.
-    """
+    """Return the compiled library, in its build for this processor; ImportError where there is none."""
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     try:
         core = ctypes.CDLL(str(Path(__file__).with_name(f"_core{suffix}")))
@@ -137,13 +133,10 @@ def in_one_thread() -> bool:
 
 
 def run_together(*work: Callable[[], _T]) -> list[_T]:
-    """Return what functions return: the first runs in this thread, others beside it, as far as there are threads.
-
-    The compiled loops release the GIL.
-    """
+    """Return what functions return: the first runs in this thread, others beside it, as far as there are threads."""
     if in_one_thread() or len(work) == 1:
         return [one() for one in work]
-    with ThreadPoolExecutor(len(work) - 1) as pool:
+    with ThreadPoolExecutor(len(work) - 1) as pool:  # The compiled loops release the GIL.
         others = [pool.submit(one) for one in work[1:]]
         return [work[0](), *(future.result() for future in others)]
 

@@ -148,11 +148,9 @@ def parts_of(table: Samples) -> Parts:
 
 
 def mirror_image(table: Samples) -> Samples:
-    """The packed table of the mirror image to the side.
-
-    Motions to the side and turns out of it change their signs, a yaw is one to the other side, and a tail at the phase
-    phi is one at pi - phi.
-    """
+    """The packed table of the mirror image to the side."""
+    # Motions to the side and turns out of it change their signs, a yaw is one to the other side, and a tail at the
+    # phase phi is one at pi - phi.
     parts = parts_of(table)
     row, column = np.tril_indices(core.MOTIONS)
     order = np.arange(parts.rest.shape[2])
@@ -177,10 +175,8 @@ def yaw_limit_of(
 
 
 def yaw_parts_at_nodes() -> Samples:
-    """Odd and then even part of what a yaw adds at its nodes, from the coefficients of its powers, (orders, orders).
-
-    The parts have the size of what is added; coefficients of so high powers cancel each other, and need more digits.
-    """
+    """Odd and then even part of what a yaw adds at its nodes, from the coefficients of its powers, (orders, orders)."""
+    # The parts have the size of what is added; coefficients of so high powers cancel each other, and need more digits.
     s = np.array([core.stretched_yaw(share) for share in YAW_SHARES])[:, None]
     order = np.arange(1, YAW_ORDERS + 1)
     odd = order % 2 == 1

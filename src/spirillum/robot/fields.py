@@ -201,14 +201,12 @@ _M = TypeVar("_M", bound=BaseModel)
 
 
 def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _M | list[str]:
-    """Check a raw table; return the model, or every problem as a sentence, unknown fields first.
-
-    A misspelt field is missing under its right name, too; its own sentence says what to do.
-    """
+    """Check a raw table; return the model, or every problem as a sentence, unknown fields first."""
     try:
         return model.model_validate(table)
     except ValidationError as error:
         sentences: list[str] = []
+        # A misspelt field is missing under its right name, too; its own sentence says what to do.
         for problem in sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden"):
             sentences += _sentences(model, problem, under)
         return list(dict.fromkeys(sentences))

@@ -350,12 +350,10 @@ def _through_points(
 
 
 def coil_spacing(wavelength: Values, amplitude: Values) -> Values:
-    """Smallest distance between neighbouring turns of the centreline, m; infinite if turns never come close.
-
-    The distance between two points of a helix at an angle t apart is
-    d(t)^2 = 2 b^2 (1 - cos t) + (lambda t/2 pi)^2; its minimum near t = 2 pi solves sin t + (p/b)^2 t = 0
-    with p = lambda/2 pi (Przybyl and Pieranski, Eur. Phys. J. E 4:445, 2001).
-    """
+    """Smallest distance between neighbouring turns of the centreline, m; infinite if turns never come close."""
+    # The distance between two points of a helix at an angle t apart is
+    # d(t)^2 = 2 b^2 (1 - cos t) + (lambda t/2 pi)^2; its minimum near t = 2 pi solves sin t + (p/b)^2 t = 0
+    # with p = lambda/2 pi (Przybyl and Pieranski, Eur. Phys. J. E 4:445, 2001).
     ratio = (wavelength / (2.0 * np.pi * amplitude)) ** 2
     neighbours = ratio * 4.4934 < 0.9761  # sin t = -ratio t has a root beyond the tangent point tan t = t
     t = np.full(np.shape(ratio), 2.0 * np.pi)

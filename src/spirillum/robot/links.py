@@ -59,11 +59,9 @@ class Links(NamedTuple):
 
 
 def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None = None) -> Links:
-    """Mass, centre, inertia and displaced volume of body and rotor.
-
-    `body.mass` is that of body and coupling together, assumed to be of uniform density; where `body.center_of_mass`
-    is given, the body's mass is displaced there as a whole. The wire has `tail.density`.
-    """
+    """Mass, centre, inertia and displaced volume of body and rotor."""
+    # `body.mass` is that of body and coupling together, assumed to be of uniform density; where `body.center_of_mass`
+    # is given, the body's mass is displaced there as a whole. The wire has `tail.density`.
     solids = robot_solids(robot) if solids is None else solids
     body, wire = solids.get("body", _NOTHING), solids["tail"]
     main = body.volume + (solids["coupling"].volume if "coupling" in solids else 0.0)

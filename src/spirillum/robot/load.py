@@ -167,15 +167,13 @@ def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelen
 
 
 def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | None, *models: str) -> Robot:
-    """The robot with another resolution of the models `slender` and `tube`.
-
-    A table has its own: with an accuracy, a tolerance or a number of phases, whatever their values, `tube` solves for
-    the flow.
-    """
+    """The robot with another resolution of the models `slender` and `tube`."""
     options = robot.model
     given = Resolution.of(resolution).model_dump(exclude_none=True)
     resolved = next((name for name in given if name != "form"), "")
     in_tube = not models or "tube" in models
+    # A table has its own: with an accuracy, a tolerance or a number of phases, whatever their values, `tube` solves for
+    # the flow.
     if resolved and in_tube and given.get("form", options.tube.form) == "table":
         said = f"{resolved} = {given[resolved]!r} with form = 'table', which has its own"
         raise InputError(f"{said}; allowed: form 'direct' or 'auto'")

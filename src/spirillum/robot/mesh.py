@@ -199,11 +199,9 @@ def _around(one: Surface, robot: Robot) -> list[Surface]:
 
 
 def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
-    """Points along the tail, spaced evenly in the angle by which its tangent and its phase turn.
-
-    A wire cannot be swept around a bend sharper than its own radius, as a very large `tail.taper` makes at the root:
-    there the line starts behind the bend.
-    """
+    """Points along the tail, spaced evenly in the angle by which its tangent and its phase turn."""
+    # A wire cannot be swept around a bend sharper than its own radius, as a very large `tail.taper` makes at the root:
+    # there the line starts behind the bend.
     tail = robot.tail
     wavenumber = 2.0 * np.pi / tail.wavelength
     form = tail.form

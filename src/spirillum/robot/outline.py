@@ -259,10 +259,8 @@ _STRAIGHT = 3.0  # length of a chord over those of its neighbours above which it
 
 @lru_cache(maxsize=64)
 def profile_outline(points: tuple[tuple[float, float], ...]) -> Outline:
-    """Outline through points (x, rho) from pole to pole, mm, about its mid-length: smooth but at corners.
-
-    Chords between corners, those much longer than what they join without one, and flat ends are straight.
-    """
+    """Outline through points (x, rho) from pole to pole, mm, about its mid-length: smooth but at corners."""
+    # Chords between corners, those much longer than what they join without one, and flat ends are straight.
     x, rho = 1e-3 * np.array(points).T
     x = x - 0.5 * (x.max() + x.min())
     if x[0] < x[-1]:

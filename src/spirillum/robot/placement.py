@@ -16,11 +16,8 @@ Ends = Literal["open", "closed"]  #: Ends of the channel: both open into a bath,
 
 
 def gap_on_asperities(roughness: Samples | float) -> Samples:
-    """Gap of a level robot whose two ends rest on asperities of a height s that carry half of its weight W each, m.
-
-    They carry N(h) = W (s/h - 1)^2 at a gap h of the mean surfaces (csrc/contacts.c), so that W/2
-    makes h = s/(1 + sqrt(1/2)).
-    """
+    """Gap of a level robot whose two ends rest on asperities of a height s that carry half of its weight W each, m."""
+    # They carry N(h) = W (s/h - 1)^2 at a gap h of the mean surfaces (csrc/contacts.c): for W/2 h = s/(1 + sqrt(1/2)).
     found: Samples = np.asarray(roughness, dtype=float) / (1.0 + np.sqrt(0.5))
     return found
 

@@ -31,10 +31,8 @@ class Derived(NamedTuple):
 
 
 def motor_current_problem(motor: Motor, battery: Battery) -> str:
-    """A sentence where (17) has no single steady current; empty where it has one.
-
-    It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
-    """
+    """A sentence where (17) has no single steady current; empty where it has one."""
+    # It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
     current = np.linspace(0.0, 1.1 * battery.voltage / max(battery.internal_resistance, 1e-3 * battery.voltage), 4001)
     r, motors, found = motor.resistance, np.zeros((current.size, MOTOR_SIZE)), np.empty((current.size, 2))
     motors[:, AXIAL_CONSTANT : AXIAL_SLOPE + 1] = (

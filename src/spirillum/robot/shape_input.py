@@ -232,13 +232,11 @@ def _read_curve(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def smoothing_notes(form: TailForm) -> tuple[Note, ...]:
-    """Warn where smoothing changes the shape of a centre line by more than the removal of noise does.
-
-    Noise leaves the radius as it is, to the square of its share, but makes a wire longer.
-    """
+    """Warn where smoothing changes the shape of a centre line by more than the removal of noise does."""
     if not form.tolerance:
         return ()
     smooth, exact = form.centre, centre_line(form.curve, 0.0)
+    # Noise leaves the radius as it is, to the square of its share, but makes a wire longer.
     changes = {name: getattr(smooth, name) / getattr(exact, name) - 1.0 for name in _SMOOTHED}
     if all(abs(change) <= _SMOOTHED[name] for name, change in changes.items()):
         return ()

@@ -118,15 +118,13 @@ def rod(start: Samples, end: Samples, radius: float, around: int, *, round_start
 
 
 def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Surface:
-    """The surface of a round wire along a curve, its ends cut square.
-
-    The cross-sections follow a rotation-minimizing frame, computed by double reflection
-    (Wang, Juettler, Zheng and Liu, ACM Trans. Graph. 27:2, 2008).
-    """
+    """The surface of a round wire along a curve, its ends cut square."""
     around = max(around, _LEAST_AROUND)
     least = np.argmin(np.abs(tangents), axis=1)
     some = np.cross(tangents, np.eye(3)[least])  # any vector perpendicular to the curve will do
     some = some / np.linalg.norm(some, axis=-1, keepdims=True)
+    # The cross-sections follow a rotation-minimizing frame, computed by double reflection
+    # (Wang, Juettler, Zheng and Liu, ACM Trans. Graph. 27:2, 2008).
     chord, own = np.diff(points, axis=0), some[:-1]
     carried, turned = _reflected(own, chord), _reflected(tangents[:-1], chord)
     carried = _reflected(carried, tangents[1:] - turned)
@@ -147,10 +145,7 @@ def _reflected(vectors: Samples, normals: Samples) -> Samples:
 
 
 def _closed(first: Samples, rings: Samples, last: Samples) -> Surface:
-    """Rings of vertices (k, n, 3) joined one to the next, and to a pole at both ends.
-
-    Around each ring the vertices turn counter-clockwise as seen from the first pole's side.
-    """
+    """Rings of vertices (k, n, 3), counter-clockwise seen from the first pole, joined to each other and the poles."""
     count, around = rings.shape[:2]
     vertices = np.concatenate([first[None], rings.reshape(-1, 3), last[None]])
     here, sector = np.arange(around), np.arange(around)
@@ -182,11 +177,9 @@ def mass_properties(vertices: Samples, faces: Faces) -> tuple[float, Samples, fl
 
 
 def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
-    """Unit normals for smooth shading at the corners of each triangle, (m, 3, 3); sharp edges stay sharp.
-
-    The mean over the triangles around a vertex, weighted by area, whose normals deviate from the corner's own by no
-    more than the crease angle.
-    """
+    """Unit normals for smooth shading at the corners of each triangle, (m, 3, 3); sharp edges stay sharp."""
+    # The mean over the triangles around a vertex, weighted by area, whose normals deviate from the corner's own by no
+    # more than the crease angle.
     check_memory("smooth shading", len(faces), "triangles", _SHADED, "as with a smaller fineness")
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     area: Samples = np.cross(b - a, c - a)

@@ -163,10 +163,7 @@ def centre_line(points: CurvePoints, tolerance: float) -> CentreLine:
 
 
 def closest_strands(strands: Sequence[Samples], along: Samples, radius: float) -> float:
-    """Least distance between points of wires, further apart along one wire than half a tightest turn, m.
-
-    Infinite where none is closer than the wire's diameter.
-    """
+    """Least distance between points of wires, on one wire half a tightest turn apart, m; infinite: over a diameter."""
     from scipy.spatial import cKDTree
 
     points = np.concatenate(strands)
@@ -179,11 +176,9 @@ def closest_strands(strands: Sequence[Samples], along: Samples, radius: float) -
 
 
 def strand_spacing(wavelength: Values, amplitude: Values, starts: int) -> Values:
-    """Least distance between neighbouring wires of a tail with several starts, m.
-
-    Points a turn t apart on neighbouring wires have d^2 = 2 b^2 (1 - cos t) + p^2 (t - 2 pi/n)^2 with p = lambda/2 pi;
-    its first minimum is found by bisection.
-    """
+    """Least distance between neighbouring wires of a tail with several starts, m."""
+    # Points a turn t apart on neighbouring wires have d^2 = 2 b^2 (1 - cos t) + p^2 (t - 2 pi/n)^2 with
+    # p = lambda/2 pi; its first minimum is found by bisection.
     whole, p2 = 2.0 * np.pi / starts, (np.asarray(wavelength) / (2.0 * np.pi)) ** 2
     b2 = np.asarray(amplitude) ** 2
     low, high = np.zeros(np.broadcast_shapes(p2.shape, b2.shape)), np.full(1, whole)

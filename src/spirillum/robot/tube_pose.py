@@ -106,10 +106,7 @@ class TubePose:
         return float(self.radius - reach)
 
     def tail_clearance(self, points: Samples, wire_radius: float) -> TailClearance:
-        """Smallest distance between the wire's surface and the wall over a whole turn of the tail.
-
-        The wire is what a ball of its radius sweeps along the centreline, so that its ends are round.
-        """
+        """Smallest distance between wire and wall over a turn; the wire is what a ball sweeps: its ends are round."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         distance, theta = self._farthest(x, np.hypot(y, z), self.tail_drop)
         index = int(np.argmax(distance))
@@ -169,10 +166,8 @@ class TubePose:
 
 @lru_cache(maxsize=256)
 def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Piece, tuple[Samples, Samples], float]]]:
-    """(x, rho) of the rings at the ends of straight pieces, along which the distance is convex, and of each arc's.
-
-    An arc comes with the largest distance between its rings: by no more does one between them reach farther.
-    """
+    """(x, rho) of the rings at the ends of straight pieces, along which the distance is convex, and of each arc's."""
+    # An arc comes with the largest distance between its rings: by no more does one between them reach farther.
     ends = [end for piece in outline.pieces if isinstance(piece, Segment) for end in (piece.start, piece.end)]
     x, rho = np.array(ends, dtype=float).reshape(-1, 2).T
     arcs = [(piece, piece.points(_SAMPLES)) for piece in outline.pieces if not isinstance(piece, Segment)]
@@ -182,11 +177,8 @@ def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Piece,
 def _farthest_of_ellipses(
     height: tuple[Samples, Samples], side: tuple[Samples, Samples, Samples]
 ) -> tuple[Samples, Samples]:
-    """Largest distance from the origin on each ellipse of the cross-section, and the angle at which it is.
-
-    Heights are a mean and a coefficient of sin(theta), distances to the side a mean and those of sin(theta) and
-    cos(theta).
-    """
+    """Largest distance from the origin on each ellipse of the cross-section, and the angle at which it is."""
+    # Heights are a mean and a coefficient of sin(theta), distances to the side a mean and those of sin and cos.
     (h_0, h_s), (w_0, w_s, w_c) = height, side
     theta = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     s, c = np.sin(theta), np.cos(theta)

@@ -147,11 +147,9 @@ def body_per_tail(s: TorqueBalance, t: FrictionTorques | None = None) -> tuple[V
 
 
 def rates_per_torque(s: TorqueBalance, t: FrictionTorques) -> tuple[Values, Values]:
-    """(Omega, omega) per joint torque: the solution of both torque rows for tau alone.
-
-    Friction is kept apart from the fluid's torques, since most of it cancels: added to them first, a large
-    one would take their digits away.
-    """
+    """(Omega, omega) per joint torque: the solution of both torque rows for tau alone."""
+    # Friction is kept apart from the fluid's torques, since most of it cancels: added to them first, a large one would
+    # take their digits away.
     determinant = _determinant(s, t)
     body = -((s.rr + s.br) + (t.rr + t.br))
     tail = (s.bb + s.rb) + (t.bb + t.rb)

@@ -92,10 +92,8 @@ def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
 
 
 def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
-    """The poses of a robot's band, from wide gaps to narrow ones and from level to steep.
-
-    As many for every robot, so that the poses of several robots compare: where a robot has no room, some are the same.
-    """
+    """The poses of a robot's band, from wide gaps to narrow ones and from level to steep."""
+    # As many for every robot, so that the poses of several compare: where a robot has no room, some are the same.
     over = left_open(batch.pose, model)
     if not over:
         return []
@@ -118,10 +116,8 @@ def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
 
 @lru_cache(maxsize=4096)
 def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: float) -> float:
-    """Pitch at which tail or coupling keep no more than the clearance, rad; 0 where even a level robot does not.
-
-    The tail stands for all that it sweeps in a turn, so that tails which differ in wavelength and hand alone share it.
-    """
+    """Pitch at which tail or coupling keep no more than the clearance, rad; 0 where even a level robot does not."""
+    # The tail stands for all that it sweeps in a turn: tails which differ in wavelength and hand alone share it.
     wire = 0.5 * g.wire_diameter
     found = contact_pitch(
         g.body,

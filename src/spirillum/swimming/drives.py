@@ -41,11 +41,8 @@ def battery_voltage(motor: Electrics, current: Values) -> Values:
 
 
 def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Values) -> Values:
-    """Steady root of (17), R(I) I = duty V(I) - (back_emf + back_emf_per_current I): one while the motor drives.
-
-    Negative where the tail drives the motor (back-emf above the voltage), NaN where it does so beyond any root, or
-    beyond what the battery's voltage allows.
-    """
+    """Steady root of (17), R(I) I = duty V(I) - (back_emf + back_emf_per_current I): one while the motor drives."""
+    # Negative where the tail drives the motor, NaN where it does so beyond any root, or beyond the battery's voltage.
     rows, shape = _rows(motor, motor.duty, back_emf, back_emf_per_current)
     found = np.empty(rows.shape[0])
     steady_currents(rows, found)

@@ -104,10 +104,7 @@ class KnownResistance(SwimmerModel):
 def swim_on_floor(
     batch: RobotBatch, model: SwimmerModel, robots: Sequence[Robot], coefficient: Values | float | None, **asked: Any
 ) -> Swimming:
-    """Steady swimming with dry friction under the robots' whole weight; without a coefficient, or free, that of `swim`.
-
-    The dissipated power holds what dry friction takes.
-    """
+    """Steady swimming with dry friction, which dissipates too, under the whole weight; free, or without, as `swim`."""
     mu = np.zeros(1) if coefficient is None else np.atleast_1d(np.asarray(coefficient, dtype=float))
     free = swim(batch, model, **asked)
     if not np.any(mu > 0) or asked.get("motion") == "free":

@@ -104,10 +104,8 @@ def intervals_over(
 
 
 def knows_torque(robot: Robot, model: SwimmerModel) -> bool:
-    """Return whether the discrepancy of a model's torque is known: not where it leaves the walls of a robot's tube out.
-
-    Observations are of speeds and rates. What walls do to the torque moves none of them, for B_eff takes it up.
-    """
+    """Whether the discrepancy of a model's torque is known: not where it leaves the walls of a robot's tube out."""
+    # Observations are of speeds and rates. What walls do to the torque moves none of them, for B_eff takes it up.
     return model.placed or robot.channel is None
 
 
@@ -241,12 +239,10 @@ def _with_discrepancy(
 
 
 def _pace_at(swum: Swimming, batch: RobotBatch, turning: Samples) -> Samples:
-    """Tail rate of a motor whose body turns otherwise by a factor, over that before, (draws,).
-
-    The fluid's torque on the rotor grows with the tail's rate, what else loads the motor with that at the joint; (17)
-    with both gives the current. B_eff was inferred with the body rate that was observed: with that of a draw, which the
-    model misses, it would not give back the tail rate that was.
-    """
+    """Tail rate of a motor whose body turns otherwise by a factor, over that before, (draws,)."""
+    # The fluid's torque on the rotor grows with the tail's rate, what else loads the motor with that at the joint; (17)
+    # with both gives the current. B_eff was inferred with the body rate that was observed: with that of a draw, which
+    # the model misses, it would not give back the tail rate that was.
     motor = batch.electrics
     if motor is None:
         return np.ones_like(turning)

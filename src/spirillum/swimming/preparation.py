@@ -149,10 +149,7 @@ def _remedy(batch: RobotBatch, model: SwimmerModel, outside: list[Limit]) -> str
 
 
 def least_gap(batch: RobotBatch, model: SwimmerModel) -> float:
-    """Least gap that a model resolves where only the film is too thin for it, to 2 %, m; NaN where that is not so.
-
-    The search goes from the placement's gap to the one that is taken where none is given.
-    """
+    """Least gap that a model resolves where only the film is too thin for it, to 2 %, m; NaN where that is not so."""
     given = batch.placement.gap
     if given is None:
         return float("nan")
@@ -220,17 +217,14 @@ class Prepared(DisplayMixin):
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
-    """The answer of `spirillum prepare --json` for several robots.
-
-    Notes name their robots; the first of each code counts the others, which a terminal does not show.
-    """
+    """The answer of `spirillum prepare --json` for several robots, whom its notes name."""
     several = len({one.robot.name for one in found}) < len(found)
     named: dict[str, dict[str, list[Note]]] = {}
     for one in found:
         for note in one.warnings:
             name = one.robot.with_tail if several else one.robot.name
             named.setdefault(note.code, {}).setdefault(name, []).append(note)
-    notes = []
+    notes = []  # The first note of each code counts the others, which a terminal does not show.
     for robots in named.values():
         first, *others = [note.prefixed(f"{name}: ") for name, own in robots.items() for note in own]
         more = f" (and {len(robots) - 1} more of {len(found)} robots: --notes)" if len(robots) > 1 else ""

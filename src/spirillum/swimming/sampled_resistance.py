@@ -243,10 +243,8 @@ def sampled_discrepancy(
 def error_of_mean(
     error: Samples | float, stated: Samples | float, scale: Samples | float, trials: Samples | float
 ) -> Samples:
-    """Standard error of a mean over trials, SI: that of one trial over the root of the number of trials.
-
-    The scatter of trials holds the error of each measurement. So a trial's error is the larger of both, not their sum.
-    """
+    """Standard error of a mean over trials, SI: that of one trial over the root of the number of trials."""
+    # The scatter of trials holds the error of each measurement. A trial's error is thus the larger of both, no sum.
     return np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
 
 

@@ -36,13 +36,11 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
 
 
 def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Swimming) -> list[Limit]:
-    """What has to hold for the linear film under a body that is held near the wall: the liquid does not cavitate.
-
-    Under a turning cylinder the least pressure is -1.837 mu u sqrt(R')/h^1.5, with u = a Omega/2, R' = a R/(R - a).
-    """
+    """What has to hold for the linear film under a body that is held near the wall: the liquid does not cavitate."""
     bound, channel = robot.fluid.cavitation_pressure, robot.channel
     if not model.placed or bound is None or channel is None or robot.body.diameter >= channel.diameter:
         return []
+    # Under a turning cylinder the least pressure is -1.837 mu u sqrt(R')/h^1.5, with u = a Omega/2, R' = a R/(R - a).
     a, radius = 0.5 * robot.body.diameter, 0.5 * channel.diameter
     pulled = 0.5 * robot.fluid.viscosity * a * np.abs(result.body_rotation_rate)
     least = (1.837 * pulled * np.sqrt(a * radius / (radius - a)) / bound) ** (2.0 / 3.0)
@@ -51,10 +49,7 @@ def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Sw
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[Note]:
-    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
-
-    A model that computes the walls takes none.
-    """
+    """What is wrong with a robot's calibration for a model, of which one that computes the walls takes none."""
     if find_swimmer_model(model).placed:
         return []
     entry = robot.calibration.get(model)

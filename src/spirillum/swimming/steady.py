@@ -142,13 +142,10 @@ def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated:
 
 
 def axial_forces(batch: RobotBatch, model: SwimmerModel, motion: Swimming, *, calibrated: bool = True) -> Samples:
-    """Force and torque of the fluid along the axis on body and rotor in a steady motion, (robots, 4), N and N m.
-
-    In the order of `SwimmerModel.axial`: force and torque on the body, force and torque on the rotor. The two forces
-    are drag and thrust; they cancel, as nothing else pushes along the axis.
-    """
+    """Axial force and torque of the fluid on the body, then on the rotor, in steady motion, (robots, 4), N and N m."""
     r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
     rates = (motion.forward_velocity, motion.body_rotation_rate, motion.forward_velocity, motion.tail_rotation_rate)
+    # Of the two forces one is drag, one thrust; they cancel, as nothing else pushes along the axis.
     force: Samples = -(r @ np.stack(rates, axis=-1)[..., None])[..., 0]
     load = model.axial_load(batch)
     return force + load

@@ -46,10 +46,7 @@ def spheroid_drag(viscosity: PerRobot, a: PerRobot, b: PerRobot) -> SpheroidDrag
 
 
 def semi_axes(batch: RobotBatch) -> tuple[PerRobot, PerRobot]:
-    """Semi-axes (a, b) of the equivalent spheroid of each body, m.
-
-    `inscribed` takes L_b/2 and D_b/2; `equal-volume` keeps L_b/2 and widens b to the body's own volume.
-    """
+    """Semi-axes (a, b) of the equivalent spheroid of each body, m; `equal-volume` widens b to the body's own volume."""
     a = 0.5 * batch.body_length
     if batch.options.perrin.spheroid == "equal-volume":
         return a, np.sqrt(batch.body_volume / (4.0 / 3.0 * np.pi * a))

@@ -89,14 +89,11 @@ def local_coefficients(batch: RobotBatch) -> LocalCoefficients:
 
 
 def coefficient_domain(batch: RobotBatch) -> list[Limit]:
-    """Where a set makes sense: 0 < c_t < c_n, else a wire would slip more easily across than along.
-
-    Fitted factors may not turn the order of both coefficients around.
-    """
+    """Where a set makes sense: 0 < c_t < c_n, else a wire would slip more easily across than along."""
     limits, options = _domain_of_the_set(batch), batch.options.rft
     if options.normal_factor == 1.0 and options.tangential_factor == 1.0:
         return limits
-    c = local_coefficients(batch)
+    c = local_coefficients(batch)  # Fitted factors may not turn the order of both coefficients around.
     across = c.normal if c.floor_normal is None else np.minimum(c.normal, c.floor_normal)
     most = options.tangential_factor * across / c.tangential
     return [*limits, Limit.named("coefficient-factors", np.full(1, options.tangential_factor), most)]
@@ -196,12 +193,10 @@ def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
 
 
 def _helix_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
-    """Of one helix.
-
-    Away from the root the tail is a plain helix, whose integrand is constant; what the taper changes is
-    integrated in w = exp(-c xi/L_t) by Gauss-Legendre nodes in tau, sinh(tau) = (B_o c/L_t) w, where the
-    integrand is smooth however steep the root is.
-    """
+    """Entries of one helix: drag, coupling, and resistance to turning."""
+    # Away from the root the tail is a plain helix, whose integrand is constant; what the taper changes is
+    # integrated in w = exp(-c xi/L_t) by Gauss-Legendre nodes in tau, sinh(tau) = (B_o c/L_t) w, where the
+    # integrand is smooth however steep the root is.
     plain = _axial_integrand(batch, np.zeros((1, 1)))
     far = [batch.tail_length * entry[:, 0] for entry in plain]
     tapered = np.isfinite(batch.taper)

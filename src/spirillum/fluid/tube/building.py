@@ -113,10 +113,7 @@ def built_tables(
     workers: int = 2,
     progress: Progress | None = None,
 ) -> list[TubeTable]:
-    """Solve for the flow at every place of a stage, for every robot, and make their tables.
-
-    Tables for whose nodes the memory does not suffice are refused before the first is solved for.
-    """
+    """Solve for the flow at every place of a stage, for every robot, and make their tables; refuse for memory first."""
     requests = [_Request.of(Places(geometry, radius, stage)) for geometry, radius in robots]
     wanted = [pose for request in requests for pose in request.poses]
     for request in requests:  # a level node stands for the tilted ones with its gap, and one with yaw for all of them

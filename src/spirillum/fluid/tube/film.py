@@ -327,10 +327,7 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
 
 
 def _off_the_wall(body: FilmBody, radius: float, e: float, p: float, psi: float) -> tuple[float, float, float]:
-    """Node of a table, less inclined where the body would touch the wall: some nodes are geometrically impossible.
-
-    Robots do not come there: only the splines know these nodes.
-    """
+    """Node of a table, less inclined where the body would touch the wall: only the splines know it, no robot."""
     least = _THINNEST * body.radius
     while not body.half and Place(body, radius, e, frame(p, psi)).ends().min() < 0.5 * least:
         e, p, psi = min(e, radius - body.radius - least), _LESS * p, _LESS * psi

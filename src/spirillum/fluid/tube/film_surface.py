@@ -193,11 +193,9 @@ def _gathered(unit: Samples, low: float, high: float, where: float, scale: float
 
 
 def _gathered_twice(unit: Samples, marks: tuple[tuple[float, float], tuple[float, float]]) -> _Stretched:
-    """Coordinate whose nodes gather at both of its ends; `marks` are (where, over which length).
-
-    With a and b the distances from the marks over their lengths, asinh a + asinh b = y is a^2 + b^2 + 2 a b cosh y =
-    sinh(y)^2, a quadratic equation for the coordinate.
-    """
+    """Coordinate whose nodes gather at both of its ends; `marks` are (where, over which length)."""
+    # With a and b the distances from the marks over their lengths, asinh a + asinh b = y is a^2 + b^2 + 2 a b cosh y =
+    # sinh(y)^2, a quadratic equation for the coordinate.
     (low, c), (high, d) = marks
     first, last = np.arcsinh((high - low) / d), np.arcsinh((high - low) / c)
     rate = 0.5 * (last + first)
@@ -225,11 +223,9 @@ class Place:
         return np.asarray(self.tube - np.hypot(side, height))
 
     def thickness(self, points: Samples, normals: Samples) -> Samples:
-        """Thickness h of the film at points in F: geometric mean of the distances along both normals, m.
-
-        With it, and lengths measured midway between the surfaces, what is left of the exact resistance hardly knows
-        the gap, for lines and for points of contact.
-        """
+        """Thickness h of the film at points in F: geometric mean of the distances along both normals, m."""
+        # With it, and lengths measured midway between the surfaces, what is left of the exact resistance hardly knows
+        # the gap, for lines and for points of contact.
         side, height = points @ self.axes[1], points @ self.axes[2] - self.offset
         outward = side * (normals @ self.axes[1]) + height * (normals @ self.axes[2])
         distance = np.hypot(side, height)
@@ -240,11 +236,9 @@ class Place:
         return np.asarray(np.sqrt(np.maximum((self.tube - distance) * along, 0.0)))
 
     def bottom(self, x: Samples, ring: float) -> tuple[Samples, Samples]:
-        """Angle at which a ring about the body's axis is nearest to the wall, rad, and its derivative by the ring's x.
-
-        Thin films are narrow: an angle that is a hundredth off misses one of a ten-thousandth of the radius. It fades
-        to 0 towards the tube's axis, where no side is nearer, and is bounded: thin films are not that far around.
-        """
+        """Angle at which a ring about the body's axis is nearest to the wall, rad, and its derivative by its x."""
+        # Thin films are narrow: an angle a hundredth off misses one of a ten-thousandth of the radius. It fades
+        # to 0 towards the tube's axis, where no side is nearer, and is bounded: thin films are not that far around.
         along, lift, deepest = self.axes[1, 0], self.axes[2, 0], _FADE * (self.tube - self.body.radius)
         across, depth = x * along, np.maximum(self.offset - x * lift, _LEAST * self.tube)
         away = np.hypot(across, depth)
@@ -288,10 +282,7 @@ class Place:
 
 
 def film_surface(place: Place, cuts: Cuts) -> FilmSurface:
-    """Surface under the lubrication film, from the rear to the front.
-
-    `along` is the derivative by a coordinate that runs from -1 to 1 in every element.
-    """
+    """Surface under the lubrication film, from rear to front; `along` is by a coordinate of -1 to 1 in an element."""
     return _spheroid(place, cuts) if place.body.half else _with_side(place, cuts)
 
 

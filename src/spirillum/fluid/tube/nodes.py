@@ -41,13 +41,10 @@ _SEARCH = (31, 1e-6)  # Steps of the search for contact, and its accuracy, rad.
 
 
 def rings_of(outline: Outline) -> Samples:
-    """Rings whose hull a body of revolution is, for `contact_offset`: (x, rho, semi-axis along, across), m.
-
-    Of a profile those that can near the wall, as of its film.
-    """
+    """Rings whose hull a body of revolution is, for `contact_offset`: (x, rho, semi-axis along, across), m."""
     rows: list[tuple[float, float, float, float]] = []
     if any(isinstance(piece, Smooth) for piece in outline.pieces):
-        found = FilmBody.of(outline).rings
+        found = FilmBody.of(outline).rings  # Of a profile those that can near the wall, as of its film.
         return np.array([(x, 0.0, half, ring) if half else (x, ring, ball, ball) for x, ring, half, ball in found])
     for piece in outline.pieces:
         if isinstance(piece, Arc):

@@ -56,10 +56,7 @@ def _solve(numbered: tuple[int, NodeSolution]) -> list[Samples]:
 def solutions(
     places: Sequence[NodeSolution], what: str, progress: Progress | None = None, workers: int = 2
 ) -> list[list[Samples]]:
-    """Return the 8x8 at every node, of every tail, (phases, 8, 8).
-
-    What was solved before is read from the cache. Places that differ in their tails only are solved for together.
-    """
+    """Return the 8x8 at every node, of every tail, (phases, 8, 8), some of them from the cache."""
     shared = solved_as_one(places)
     together = [
         places[numbers[0]]._replace(tails=tuple(tail for number in numbers for tail in places[number].tails))
@@ -109,10 +106,8 @@ def _solutions(
 
 
 def _mixed(numbered: Sequence[tuple[int, NodeSolution]]) -> list[tuple[int, NodeSolution]]:
-    """Cheap and expensive nodes evenly spread, those of each resolution and tilt in their order.
-
-    The time that is left is then that of the mean pace; it would else be judged by the most expensive ones.
-    """
+    """Cheap and expensive nodes evenly spread, those of each resolution and tilt in their order."""
+    # The time that is left is then that of the mean pace; it would else be judged by the most expensive ones.
     kinds: dict[tuple[Fineness, bool, bool], list[tuple[int, NodeSolution]]] = {}
     for one in numbered:
         kinds.setdefault((one[1].fineness, one[1].pose.level, one[1].pose.yaw == 0.0), []).append(one)
@@ -139,10 +134,8 @@ def factor_of(matrix: Samples, where: str) -> Samples:
 
 
 def fourier(values: Samples, size: int = 0, starts: int = 1) -> Samples:
-    """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0.
-
-    A tail with several starts has harmonics of its turn over them only; those that so few phases do not give are zero.
-    """
+    """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0."""
+    # A tail with several starts has harmonics of its turn over them only; those that so few phases do not show are 0.
     count = len(values)
     phase = 2.0 * np.pi * np.arange(count) / count
     size = max(size, count)

@@ -87,11 +87,9 @@ def projectors(theta: Samples, modes: int, parity: int) -> tuple[Samples, Sample
 
 
 def finer(panels: Panels, distances: Samples, cut: float, least: int) -> tuple[Samples, Samples, Samples]:
-    """Positions x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q).
-
-    A wave is damped by exp(-cut) at k (d + d_min) = cut: up to there its Legendre coefficients are averaged to 1e-5.
-    With fewer nodes the resistance to pitching is 11 % low at 0.1 mm: thin films amplify what is missed.
-    """
+    """Positions x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q)."""
+    # A wave is damped by exp(-cut) at k (d + d_min) = cut: up to there its Legendre coefficients are averaged to 1e-5.
+    # With fewer nodes the resistance to pitching is 11 % low at 0.1 mm: thin films amplify what is missed.
     u = panels.rule[0]  # Gauss nodes resolve waves that shorten towards the ends of a panel, as they crowd there
     dense = np.sqrt(1.0 - (0.5 * (u[1:] + u[:-1])) ** 2) / np.diff(u)
     speeds = np.max(dense * np.hypot(np.diff(panels.x, axis=1), np.diff(panels.rho, axis=1)), axis=1)
@@ -229,13 +227,11 @@ class LevelRings(Rings):
         return np.stack([pair[0] for pair in pairs]), np.stack([pair[1] for pair in pairs])
 
     def _strengths(self, waves: WallWaves, *, averaged: bool = False) -> list[Samples]:
-        """Each mode on the nodes from unit modes on the reference cylinder, (3 nodes, k, 2, 3) each.
-
-        The 2 stands for the real and the imaginary part of the wave. The film between a body and the wall may be
-        thinner than nodes are apart: tractions enter by averages over the panels, with what each node contributes.
-        """
+        """Each mode on the nodes from real and imaginary unit modes on the cylinder, (3 nodes, k, 2, 3) each."""
         panels = self.panels
         x, rho, average = panels.x, panels.rho, None
+        # The film between a body and the wall may be thinner than nodes are apart: tractions enter by averages over the
+        # panels, with what each node contributes.
         if averaged:
             distances = waves.radius - self.offset - panels.rho.max(axis=1)
             x, rho, average = finer(panels, distances, waves.cut, _FINER)

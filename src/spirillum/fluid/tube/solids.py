@@ -273,12 +273,10 @@ def check_fits(memory: float) -> None:
 
 
 def _mode_counts(panels: Panels, pose: TubePose, fineness: Fineness, lines: Samples) -> np.ndarray:
-    """Number of modes at each node; 0 and 1 represent all rigid motions.
-
-    What a ring of radius rho at a distance e from the axis sends to the wall and back in mode m falls off as
-    exp(-2 m zeta), cosh(zeta) = (R^2 - rho^2 - e^2)/(2 e rho), where the film's thickness vanishes at complex angles;
-    for a film that is squeezed times powers of m, hence some more. So with wires, see `interaction`.
-    """
+    """Number of modes at each node; 0 and 1 represent all rigid motions."""
+    # What a ring of radius rho at a distance e from the axis sends to the wall and back in mode m falls off as
+    # exp(-2 m zeta), cosh(zeta) = (R^2 - rho^2 - e^2)/(2 e rho), where the film's thickness vanishes at complex angles;
+    # for a film that is squeezed times powers of m, hence some more. So with wires, see `interaction`.
     x, rho = panels.x.ravel(), panels.rho.ravel()
     r = pose.radius
     e = r - rho - np.maximum(pose.distances(x, rho), 1e-12 * r)

@@ -155,12 +155,10 @@ def response_of(matrix: Samples) -> Samples:
 
 
 def response_errors(matrix: Samples, true: Samples, turn: Samples | None = None) -> Samples:
-    """Errors of `RESPONSES`, over the size of what acts on the robot, sideways force and torques over those in all.
-
-    With matrices over a turn of the tail sizes are root mean squares over them, for a force that nearly vanishes at one
-    phase moves nothing.
-    """
+    """Errors of `RESPONSES`, over the size of what acts on the robot, sideways force and torques over those in all."""
     a, b = response_of(matrix), response_of(true)
+    # With matrices over a turn of the tail sizes are root mean squares over them, for a force that nearly vanishes at
+    # one phase moves nothing.
     sizes = np.stack([response_of(some) for some in (true[None] if turn is None else turn)])
     force, torque = (np.hypot(sizes[:, first], sizes[:, first + 1]) for first in (2, 4))
     of_each = np.stack([sizes[:, 0], sizes[:, 1], force, torque, torque, sizes[:, 6]])

@@ -269,10 +269,8 @@ def _columns(families: Sequence[Sequence[np.ndarray]], modes: int, nodes: int) -
 
 
 def _onto_modes(theta: Samples, modes: int, precision: type[np.floating], *, symmetric: bool) -> Samples:
-    """From even and odd waves around rings to modes: parity of the wave, component, angle, mode.
-
-    Even waves move the even family only where rings and waves are mirror images of themselves, else both families.
-    """
+    """From even and odd waves around rings to modes: parity of the wave, component, angle, mode."""
+    # Even waves move the even family only where rings and waves are mirror images of themselves, else both families.
     even, odd = (np.stack(projectors(theta, modes, parity)).astype(precision) for parity in (0, 1))
     moved = [even, odd] if symmetric else [np.concatenate([even, odd], axis=1)] * 2
     return np.stack(moved).swapaxes(2, 3)

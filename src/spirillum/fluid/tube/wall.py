@@ -91,11 +91,9 @@ def waves_between(
 
 
 def _nodes(step: float, crowd: float, lowest: float, steepest: float) -> tuple[Samples, Samples]:
-    """Nodes in k and weights, 1/m, of the trapezoidal rule in t, k = c log(1 + exp(t/c)), and of what is below it.
-
-    Even steps in t come exponentially close to k = 0, even where k > c. Below the first node the integrand is
-    extrapolated linearly in log k from the first two.
-    """
+    """Nodes in k and weights, 1/m, of the trapezoidal rule in t, k = c log(1 + exp(t/c)), and of what is below it."""
+    # Even steps in t come exponentially close to k = 0, even where k > c. Below the first node the integrand is
+    # extrapolated linearly in log k from the first two.
     first, least = (int(np.ceil(crowd / step * np.log(share))) for share in (lowest, _NEGLIGIBLE))
     t = step * np.arange(least, np.ceil(steepest / step) + 1.0)
     k = crowd * np.logaddexp(0.0, t / crowd)
@@ -177,10 +175,8 @@ def distances_of(points: Samples, radius: float) -> Samples:
 
 
 def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.ndarray]:
-    """Sort points by their distance from the wall; return them, their distances, and the inverse permutation.
-
-    What waves reach are then the first of the points: sums over them need no index.
-    """
+    """Sort points by their distance from the wall; return them, their distances, and the inverse permutation."""
+    # What waves reach are then the first of the points: sums over them need no index.
     distances = distances_of(points, radius)
     order = np.argsort(distances, kind="stable")
     rows: np.ndarray = (3 * np.argsort(order)[:, None] + np.arange(3)).ravel()

@@ -147,11 +147,9 @@ def longest_panels(solids: Sequence[tuple[Outline, int]], lines: Samples) -> Cal
 
 
 def _mode_counts(panels: Panels, wires: tuple[Wire, ...], resolution: Discretisation) -> list[int]:
-    """Number of modes on each solid; 0 and 1 represent all rigid motions.
-
-    With cosh(zeta) = (X^2 + rho^2 + rho'^2 + e^2)/(2 rho rho'), what mode m sends from a wire to a surface and back
-    falls off as exp(-2 m zeta).
-    """
+    """Number of modes on each solid; 0 and 1 represent all rigid motions."""
+    # With cosh(zeta) = (X^2 + rho^2 + rho'^2 + e^2)/(2 rho rho'), what mode m sends from a wire to a surface and back
+    # falls off as exp(-2 m zeta).
     x, rho = panels.x.ravel(), panels.rho.ravel()
     counts = np.full(int(panels.solid.max()) + 1, 2)
     for wire in wires:

@@ -102,12 +102,9 @@ class Panels:
         return blocks.reshape(modes, 3 * x.size, 3 * self.size)
 
     def matrices(self, modes: int) -> Samples:
-        """Matrix of each mode, (modes, 3 nodes, 3 nodes), 8 pi mu times velocity over density.
-
-        A pressure inside a solid is a density that moves nothing: in mode 0 a rank-one term for each solid
-        takes it away.
-        """
+        """Matrix of each mode, (modes, 3 nodes, 3 nodes), 8 pi mu times velocity over density."""
         blocks = self.velocities(self.x.ravel(), self.rho.ravel(), modes, on_nodes=True)
+        # A pressure inside a solid is a density that moves nothing: in mode 0 a rank-one term for each takes it away.
         for solid in np.unique(self.solid):
             there = self.solid_of_node == solid
             null = np.zeros((self.size, 3))
@@ -144,10 +141,8 @@ def _panel_parameters(
     longest: Callable[[Samples, Samples], Samples],
     order: int,
 ) -> list[Samples]:
-    """Parameters t of the nodes of each panel of a piece; they crowd where its start or end is a sharp edge.
-
-    Panels shrink towards the ends of a long piece, and towards a short neighbour, such as a fillet, to its length.
-    """
+    """Parameters t of the nodes of each panel of a piece; they crowd where its start or end is a sharp edge."""
+    # Panels shrink towards the ends of a long piece, and towards a short neighbour, such as a fillet, to its length.
     edges = [0.0, 1.0]
     if isinstance(piece, Arc):  # at most 60 degrees
         parts = int(np.ceil(abs(piece.angles[1] - piece.angles[0]) / (np.pi / 3 + 1e-9)))
@@ -278,11 +273,9 @@ class Sources:
         return np.concatenate(found, axis=2)
 
     def _torque_velocities(self, panels: Panels, forces: Samples) -> Samples:
-        """Velocities from ring torques (T_x, T_rho, T_theta), (modes, 3 nodes, 3 stations).
-
-        A torque is half the difference of two couples of forces: T_x = [f_theta along rho - f_rho along theta]/2 and
-        so on. Derivatives along x and rho are central differences; along theta, phase and unit vectors turn.
-        """
+        """Velocities from ring torques (T_x, T_rho, T_theta), (modes, 3 nodes, 3 stations)."""
+        # A torque is half the difference of two couples of forces: T_x = [f_theta along rho - f_rho along theta]/2 and
+        # so on. Derivatives along x and rho are central differences; along theta, phase and unit vectors turn.
         modes, rows = forces.shape[:2]
         blob = np.concatenate([np.full(len(wire.points), wire.blob) for wire in self.wires])
         rho = np.maximum(self.rho, _STEP * blob)[:, None]

@@ -86,10 +86,7 @@ def stations_along(curve: Samples, radius: float, spacing: float = 1.0) -> Wire:
 
 
 def closest_approach(wire: Wire) -> float:
-    """Least distance between stations further apart along the wire than half a tightest turn, m.
-
-    Infinite where none is closer than the wire's diameter.
-    """
+    """Least distance between stations further along a wire than half a tightest turn, m; inf: over a diameter."""
     from scipy.spatial import cKDTree
 
     at = np.cumsum(wire.lengths) - 0.5 * wire.lengths
@@ -165,15 +162,13 @@ def _on_part(rows: Samples, part: np.ndarray) -> Samples:
 
 
 def _spin_torque(wire: Wire, part: int) -> Samples:
-    """Torque over rotation of a wire's cross-sections, each alone, (12, 12); viscosity 1.
-
-    4 pi a^2 per arc length about the tangent, as a spinning cylinder, and half of it across: first moments of the
-    traction tilt a cross-section as they would in the line's own flow.
-    """
+    """Torque over rotation of a wire's cross-sections, each alone, (12, 12); viscosity 1."""
     tangent = wire.tangents.T @ (wire.lengths[:, None] * wire.tangents)
     across = np.sum(wire.lengths) * np.eye(3) - tangent
     matrix = np.zeros((12, 12))
     at = slice(6 * part + 3, 6 * part + 6)
+    # 4 pi a^2 per arc length about the tangent, as a spinning cylinder, and half of it across: first moments of the
+    # traction tilt a cross-section as they would in the line's own flow.
     matrix[at, at] = 4.0 * np.pi * wire.radius**2 * (tangent + _TILT * across)
     return matrix
 
