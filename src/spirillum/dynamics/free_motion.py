@@ -20,13 +20,7 @@ from spirillum.dynamics.release import InTube, Release, released_state
 from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_simulation import (
-    Checked,
-    check_in_tube,
-    compare_with_check,
-    links_in_tube,
-    sticking_notes,
-)
+from spirillum.dynamics.tube_simulation import Checked, check_in_tube, compare_with_check, links_in_tube, sticking_notes
 from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.kernels import core

@@ -20,13 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot, TwoLinks, two_links
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTERRUPTED, Checkpoint, Reach, Trajectory, integrate
 from spirillum.dynamics.record import series_of, tail_angle_of
-from spirillum.dynamics.release import (
-    InTube,
-    Release,
-    reach_of,
-    released_state,
-    resting_state,
-)
+from spirillum.dynamics.release import InTube, Release, reach_of, released_state, resting_state
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.timing import Switch

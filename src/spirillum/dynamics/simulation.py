@@ -14,14 +14,7 @@ from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_interv
 from spirillum.dynamics.free_robot import two_links
 from spirillum.dynamics.integration import integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.release import (
-    InTube,
-    Release,
-    check_not_resolved,
-    reach_of,
-    resting_state,
-    turning_rate,
-)
+from spirillum.dynamics.release import InTube, Release, check_not_resolved, reach_of, resting_state, turning_rate
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
 from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.dynamics.timing import Timing
