@@ -15,6 +15,7 @@ from spirillum.measurement.outliers import without_codec_lag
 from spirillum.measurement.series import observation_rows
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, Trial, trial_of
 from spirillum.units import Hz
+from spirillum.virtual.optics import VirtualLens
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.track import Track
 
@@ -200,6 +201,19 @@ def test_a_copy_of_a_trial_is_said(make_trial: MakeTrial) -> None:
     assert [len(flags) for flags in copies] == [0, 0, 1]
     assert "the same as a," in copies[2][0].sentence
     assert summary_of(trials) == summary_of(trials[:2])
+
+
+def test_a_tilted_camera_moves_the_lateral_position_by_what_is_said(make_trial: MakeTrial) -> None:
+    """Against the virtual camera, an independent lens: the pixel of a point, seen through a lens that is level."""
+    trial = make_trial("a")
+    found = Measurement((trial,), summary_of([trial]), sp.load("biorob2012-wide"), "setup.toml")
+    setup, tilt = trial.track.setup, math.radians(0.2)
+    assert setup.tank.surface is not None
+    level = VirtualLens(setup.camera.height, setup.tank.surface, setup.tank.index, 740.0, (640, 480))
+    height = setup.robot.axis_height
+    pixel = replace(level, tilt=(tilt, 0.0)).project(np.array([[0.0, 0.0, height]]))[:, :2]
+    moved = abs(float(level.points(pixel, height)[0, 1]))
+    assert found.lateral_shift == pytest.approx(moved * math.radians(1.0) / tilt, rel=1e-3)
 
 
 def test_tracking_alone_makes_no_wobble(make_trial: MakeTrial) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import checked_path, file_name
 from spirillum.measurement.flags import BY_HAND
@@ -165,6 +165,17 @@ class Measurement(DisplayMixin):
             found.append(Note("files", words))
         return tuple(found)
 
+    @property
+    def lateral_shift(self) -> float:
+        """By how much one degree of the camera's tilt moves the lateral position, m; in no interval.
+
+        A ray that leaves the lens at an angle crosses the air, and below a surface the oil, where it is refracted.
+        """
+        setup = self.trials[0].track.setup
+        surface = setup.robot.axis_height if setup.tank.surface is None else setup.tank.surface
+        air, oil = setup.camera.height - surface, surface - setup.robot.axis_height
+        return math.radians(1.0) * (air + oil / setup.tank.index)
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON, SI with rates in rad/s."""
         content = {
@@ -172,6 +183,7 @@ class Measurement(DisplayMixin):
             "setup": self.setup,
             "trials": [{"name": trial.name, **trial.to_dict()} for trial in self.trials],
             "summary": self.summary.to_dict(),
+            "lateral_shift_of_a_degree": quantity(self.lateral_shift, "m"),
             "failures": [{"video": video, "sentence": sentence} for video, sentence in self.failures],
             "files": list(self.files),
         }

@@ -6,7 +6,17 @@ from collections.abc import Iterator
 
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, Blocks, Detail, cell, grid, quantity_grid, reason_of, sentences_of
+from spirillum.cli.tables.parts import (
+    Answer,
+    Blocks,
+    Detail,
+    cell,
+    grid,
+    in_words,
+    quantity_grid,
+    reason_of,
+    sentences_of,
+)
 from spirillum.display import percent
 from spirillum.measurement.statistics import ShownNumber, rounded_with_ends
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
@@ -79,6 +89,9 @@ def measurement(answer: Answer) -> Blocks:
         if isinstance(item, dict) and (item["value"] is not None or name in RATE_NAMES):
             rows.add_row(name.replace("_", " "), *_numbers(item), *([str(item["n"])] if several else []))
     yield rows
+    if summary["lateral_position"]["value"] is not None:
+        shift = in_words(answer["lateral_shift_of_a_degree"])
+        yield f"lateral position: of a level camera; a tilt of one degree, in no interval, moves it by {shift}"
     yield from _intervals(answer, several=several)
     if answer["files"]:
         listed = [name for name in answer["files"] if not name.startswith("figures/")]
