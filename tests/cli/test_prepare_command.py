@@ -13,6 +13,7 @@ from spirillum.fluid.tube import progress_messages
 from spirillum.fluid.tube.outer_resistance import NodeSolution, _mixed
 from spirillum.fluid.tube.progress_messages import progress_message
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.stages import RESPONSES
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.tube_pose import TubePose
@@ -69,6 +70,22 @@ def test_a_caution_on_several_tables_says_on_how_many() -> None:
     assert second.startswith("biorob2012-wide, tail 30 x 2.5 mm: sideways force")
 
 
+def test_the_worst_error_of_several_tables_is_named_first() -> None:
+    """Each over what is allowed of it; the robots stay in the order of the request."""
+    made = sp.prepare("biorob2012-wide")
+    allowed = {name: share for name, share in RESPONSES.items() if name in ("sideways_force", "pitching_torque")}
+    slight, bad = ({**made.table.error, **{n: x * share for n, share in allowed.items()}} for x in (1.1, 1.5))
+    bad |= {"sideways_force": 1.7 * allowed["sideways_force"]}
+    other = sp.load("biorob2012-wide", **{"tail.wavelength": "30 mm"})
+    found = [Prepared(made.robot, replace(made.table, error=slight)), Prepared(other, replace(made.table, error=bad))]
+    answer = preparations_answer(found)
+    sentences = [note["sentence"] for note in answer["notes"] if note["code"] == "table-not-checked"]
+    assert sentences[0].startswith("biorob2012-wide, tail 30 x 2.5 mm: sideways force")
+    assert "tail 25 x 2.5 mm" in sentences[-1]
+    errors = [robot["error"]["sideways_force"]["value"] for robot in answer["robots"]]
+    assert errors == pytest.approx([slight["sideways_force"], bad["sideways_force"]])
+
+
 def test_an_error_above_the_allowed_one_is_written_with_digits_that_differ() -> None:
     found = sp.prepare("biorob2012-wide")
     for error, said in ((0.0201, "2.01 %"), (0.02 + 1e-9, "2.0000001 %"), (0.034, "3.4 %")):
@@ -105,13 +122,18 @@ def test_what_an_interrupted_preparation_has_kept_is_announced(monkeypatch: pyte
     monkeypatch.setattr(progress_messages, "slowdown", lambda _: 1.0)
     said = progress_message(60, 2, 48, (10.0, 17.0))
     assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min on 2 free cores" in said
+    several = progress_message(60, 2, 48, (10.0, 17.0), further=24)  # two more tails at each: 0.42 of a pose each
+    assert "12 remaining, in 2 to 3 min on 2 free cores" in several
     monkeypatch.setattr(progress_messages, "slowdown", lambda _: 3.0)
     busy = progress_message(60, 2, 48, (10.0, 17.0))
     assert busy.endswith("in 60 s to 2 min on 2 free cores, up to 5 min beside this machine's other work")
 
 
 def test_the_time_left_does_not_jump_between_cheap_and_expensive_poses() -> None:
-    """Forty nodes of 1 s and five of 12 s: at any time the mean pace gives the rest within 12 s and a sixth."""
+    """Forty nodes of 1 s and five of 12 s: at any time the mean pace gives the rest within 12 s and a sixth.
+
+    They differ in their resolution, or in the number of tails that share them.
+    """
     pose, geometry = TubePose(0.02, 0.01), RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide")))
     tail = ((geometry, (0.0,)),)
     cost = {Fineness("standard", 0.03, 4): 1.0, Fineness("standard", 0.002, 6): 12.0}
@@ -119,6 +141,8 @@ def test_the_time_left_does_not_jump_between_cheap_and_expensive_poses() -> None
     nodes = [NodeSolution(tail, pose, fine)] * 5 + [NodeSolution(tail, pose, coarse)] * 40
     seconds = [cost[node.fineness] for _, node in _mixed(list(enumerate(nodes)))]
     assert sorted(number for number, _ in _mixed(list(enumerate(nodes)))) == list(range(45))
-    for done in range(10, 45):
-        expected, true = sum(seconds[:done]) / done * (45 - done), sum(seconds[done:])
-        assert abs(expected - true) < 12.0 + true / 6.0
+    shared = [NodeSolution(tail * 12, pose, coarse)] * 5 + [NodeSolution(tail, pose, coarse)] * 40
+    for costs in (seconds, [float(len(node.tails)) for _, node in _mixed(list(enumerate(shared)))]):
+        for done in range(10, 45):
+            expected, true = sum(costs[:done]) / done * (45 - done), sum(costs[done:])
+            assert abs(expected - true) < 12.0 + true / 6.0

@@ -176,7 +176,12 @@ class Prepared(DisplayMixin):
 
     @property
     def warnings(self) -> tuple[Note, ...]:
-        """What to be careful about, a sentence each."""
+        """What to be careful about, a sentence each, the worst error first."""
+        return (*self.robot.warnings, *(note for _, note in self.excesses))
+
+    @property
+    def excesses(self) -> list[tuple[float, Note]]:
+        """Errors of the table over those that are allowed, where they are larger, the worst first, with their notes."""
         stage = STAGES[self.table.stage]
         where = "at yawed poses between" if stage.yawed else "between"
         worse = []
@@ -185,8 +190,8 @@ class Prepared(DisplayMixin):
             if error > most:
                 off, bound = show_apart(100.0 * error, 100.0 * most, "1", least=2)
                 words = {"what": name.replace("_", " "), "off": off, "where": where, "most": bound}
-                worse.append(Note.named("table-error", name=name, **words))
-        return (*self.robot.warnings, *worse)
+                worse.append((error / most, Note.named("table-error", name=name, **words)))
+        return sorted(worse, key=lambda one: -one[0])
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum prepare --json`."""
@@ -217,8 +222,10 @@ class Prepared(DisplayMixin):
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
-    """The answer of `spirillum prepare --json` for several robots, whom its notes name."""
+    """The answer of `spirillum prepare --json` for several robots, whom its notes name, the worst error first."""
+    content = [one.content for one in found]
     several = len({one.robot.name for one in found}) < len(found)
+    found = sorted(found, key=lambda one: -max((excess for excess, _ in one.excesses), default=0.0))
     named: dict[str, dict[str, list[Note]]] = {}
     for one in found:
         for note in one.warnings:
@@ -229,7 +236,7 @@ def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
         first, *others = [note.prefixed(f"{name}: ") for name, own in robots.items() for note in own]
         more = f" (and {len(robots) - 1} more of {len(found)} robots: --notes)" if len(robots) > 1 else ""
         notes += [Note(first.code, f"{first}{more}", first.fields), *others]
-    return envelope("preparations", {"robots": [one.content for one in found]}, notes)
+    return envelope("preparations", {"robots": content}, notes)
 
 
 def prepare(

@@ -122,7 +122,7 @@ def built_tables(
             check_solvable(request.places.geometry, node.pose, node.fineness)
     if progress is not None:
         count, kept = _solved_before(wanted)
-        progress(progress_message(count, workers, kept, stage.seconds), 0, count)
+        progress(progress_message(count, workers, kept, stage.seconds, _further_tails(wanted)), 0, count)
     start = time.perf_counter()
     films = _start_films(requests, workers)
     try:
@@ -161,6 +161,12 @@ def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
     """Number of nodes that are solved for separately, and how many of them are cached."""
     shared = solved_as_one(places)
     return len(shared), sum(all_cached([places[number] for number in numbers]) for numbers in shared)
+
+
+def _further_tails(places: Sequence[NodeSolution]) -> int:
+    """Number of robots beyond the first at each node that is solved for."""
+    shared = solved_as_one(places)
+    return sum(len(numbers) - 1 for numbers in shared if not all_cached([places[number] for number in numbers]))
 
 
 def _start_films(requests: Sequence[_Request], workers: int) -> Thread:

@@ -106,11 +106,12 @@ def _solutions(
 
 
 def _mixed(numbered: Sequence[tuple[int, NodeSolution]]) -> list[tuple[int, NodeSolution]]:
-    """Cheap and expensive nodes evenly spread, those of each resolution and tilt in their order."""
+    """Cheap and expensive nodes evenly spread, those of each resolution, tilt and number of tails in their order."""
     # The time that is left is then that of the mean pace; it would else be judged by the most expensive ones.
-    kinds: dict[tuple[Fineness, bool, bool], list[tuple[int, NodeSolution]]] = {}
+    kinds: dict[tuple[Fineness, bool, bool, int], list[tuple[int, NodeSolution]]] = {}
     for one in numbered:
-        kinds.setdefault((one[1].fineness, one[1].pose.level, one[1].pose.yaw == 0.0), []).append(one)
+        node = one[1]
+        kinds.setdefault((node.fineness, node.pose.level, node.pose.yaw == 0.0, len(node.tails)), []).append(one)
     spread = [((rank + 0.5) / len(kind), one) for kind in kinds.values() for rank, one in enumerate(kind)]
     return [one for _, one in sorted(spread, key=lambda pair: (pair[0], pair[1][0]))]
 
