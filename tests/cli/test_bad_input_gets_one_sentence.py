@@ -149,6 +149,13 @@ WIDE = "biorob2012-wide"
         ),
         (["simulate", WIDE, "-o", "run.nc", "--motion", "held", "--no-weight"], "--no-weight with motion = 'held'"),
         (["study", ""], "an empty word after study; allowed: a name"),
+        (["calibrate", "", WIDE], "an empty word after calibrate; allowed: a name"),
+        (["film", "", "-o", "a.mp4"], "an empty word after film; allowed: a name"),
+        (
+            ["predict", WIDE, "--set", "tail.curve=no.csv"],
+            "no.csv does not exist; allowed: for tail.curve a CSV file of points (x, y, z) in mm",
+        ),
+        (["predict", WIDE, "--set", f"name={'x' * 300}"], "is not allowed; allowed: at most 200 characters"),
         (["citation", "cfd"], "allowed"),
         (["robot", "check", "missing.toml"], "does not exist"),
         (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),

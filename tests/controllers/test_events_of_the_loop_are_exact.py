@@ -161,10 +161,12 @@ def test_a_number_without_unit_is_si_in_python_and_refused_in_a_file(tmp_path: P
     assert Lab.of(tables).camera.latency == pytest.approx(0.05)
     file = tmp_path / "lab.toml"
     file.write_text("[camera]\nfps = 20.0\nlatency = 0.05\n")
-    with pytest.raises(InputError, match=r"camera\.latency = 0.05 has no unit; allowed: a number with its unit"):
+    with pytest.raises(InputError, match=r"lab.toml: camera\.latency = 0.05 has no unit; allowed: a number"):
         Lab.of(file)
     file.write_text('[camera]\nfps = 20.0\nlatency = "50 ms"\n')
     assert Lab.of(file) == Lab.of(tables)
+    with pytest.raises(InputError, match=r"^camera\.latency = "):  # which no file says
+        Lab.read(file, {"camera.latency": "0.05"})
 
 
 def test_an_interrupt_keeps_the_run_with_the_drive_off(toy: Any) -> None:

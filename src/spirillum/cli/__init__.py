@@ -21,7 +21,10 @@ from typing import Any, TextIO
 
 __all__ = ["main"]
 
-_NAMING = ("measure", "observations", "robot", "setup", "study", "virtual-experiment")
+_NAMING = (
+    *("calibrate", "film", "measure", "observations", "rank-models", "robot", "setup", "study", "suggest"),
+    "virtual-experiment",
+)
 """Commands whose arguments name files and folders."""
 _INSTEAD = {
     ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "

@@ -154,12 +154,16 @@ class Lab(Section):
     def read(cls, path: str | Path | None, changes: Mapping[str, Any]) -> Self:
         """A lab from its file, with fields changed by dotted name, as ``{"camera.latency": "50 ms"}``."""
         tables: dict[str, Any] = {} if path is None else read_toml(Path(path), _WHAT)
+        try:
+            whole = cls._from(tables, written=True)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
         for name, value in changes.items():
             table, dot, entry = name.partition(".")
             if not dot or not isinstance(tables.get(table, {}), dict):
                 raise InputError(f"lab: {name[:60]!r} is no field; allowed: TABLE.FIELD, such as camera.latency")
             tables[table] = {**tables.get(table, {}), entry: value}
-        return cls._from(tables, written=True)
+        return cls._from(tables, written=True) if changes else whole
 
     @classmethod
     def exact(cls) -> Self:

@@ -9,6 +9,7 @@ from functools import cache
 from io import BytesIO
 from math import prod
 from pathlib import Path
+from shutil import copyfileobj
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
@@ -61,8 +62,9 @@ def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.Fi
     content = BytesIO()
     with _hdf5()(content, "w", track_order=True) as stored, h5netcdf.File(stored, "w") as file:
         yield file
-    with atomic_write(path, replace=replace) as temporary, content.getbuffer() as whole:
-        temporary.write_bytes(whole)
+    content.seek(0)
+    with atomic_write(path, replace=replace) as temporary, temporary.open("wb") as target:
+        copyfileobj(content, target)  # in parts: no view of the whole outlives it where the disk is full
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, *, replace: Replace = "own") -> None:

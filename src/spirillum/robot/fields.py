@@ -287,6 +287,9 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
         "int_from_float": "a whole number",
         "float_parsing": "a number",
         "float_type": "a number",
+        "string_too_long": f"at most {context.get('max_length')} characters",
+        "string_too_short": "text that is not empty",
+        "string_type": "text in quotes",
         "bool_type": "true or false",
         "bool_parsing": "true or false",
     }

@@ -40,7 +40,7 @@ _TURNED = 0.5  # cosine of the largest angle between neighbouring chords of a ce
 
 def read_points(path: Path, columns: Sequence[str], field: str) -> list[list[float]]:
     """Points of a file, one a row, mm; a first row of words names the columns, which are in mm or in its unit."""
-    what = f"{field}: a CSV file of points ({', '.join(columns)}) in mm"
+    what = f"for {field} a CSV file of points ({', '.join(columns)}) in mm"
     rows, scale = csv_rows(read_text(path, what), path, what), 1.0
     if rows and not any(map(_is_written_number, rows[0][1])):
         scale = _scale_of(rows[0][1], columns)
