@@ -3,13 +3,24 @@
 Public names are declared in `__init__.pyi` and loaded at first use, so that importing the package is cheap.
 """
 
-from typing import Any
+from __future__ import annotations
 
-import lazy_loader
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # `typing` itself takes most of the time that the package has for its import
+    from collections.abc import Callable
+    from typing import Any
 
-from spirillum.deprecated import RENAMED, current_name
+_stub: list[tuple[Callable[[str], Any], list[str]]] = []
 
-_load, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+def _public() -> tuple[Callable[[str], Any], list[str]]:
+    """Return the loader of public names and the names, read from the stub at first use."""
+    if not _stub:
+        import lazy_loader
+
+        load, _, names = lazy_loader.attach_stub(__name__, __file__)
+        _stub.append((load, names))
+    return _stub[0]
 
 
 def __getattr__(name: str) -> Any:
@@ -17,11 +28,18 @@ def __getattr__(name: str) -> Any:
         from spirillum.version import package_version
 
         return package_version()
+    if name.startswith("__") and name != "__all__":  # which Python itself looks for
+        raise AttributeError(f"module 'spirillum' has no attribute {name!r}")
+    load, names = _public()
+    if name == "__all__":
+        return names
+    from spirillum.deprecated import RENAMED, current_name
+
     if name in RENAMED:
         return __getattr__(current_name(name))
-    if name not in __all__:
+    if name not in names:
         raise AttributeError(f"module 'spirillum' has no attribute {name!r}")
-    value = _load(name)
+    value = load(name)
     if not isinstance(value, type):
         from spirillum.argument_validation import validate_arguments
 
@@ -32,4 +50,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted((*__all__, "__version__"))
+    return sorted((*_public()[1], "__version__"))

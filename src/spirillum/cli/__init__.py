@@ -37,6 +37,8 @@ _INTERRUPTED = 128 + signal.SIGINT
 _TERMINATED = 128 + signal.SIGTERM  # exit code after SIGTERM, which schedulers expect, however the command ends then
 _KEPT = "interrupted; finished files are kept"
 _AGAIN = 0.02  # after this time an interrupt that was dropped comes again, s
+_NOT_LEAKED = "ignore:resource_tracker:UserWarning"
+"""For the process that removes semaphores after one that was killed: it need not say so."""
 _OBJECTS = 50_000
 """New objects between two looks for garbage: imports make many that stay. The last look, at the end, is left out."""
 
@@ -78,6 +80,7 @@ def _exit_despite_threads(code: int) -> None:
 def _prepare() -> None:
     """Settings that only a separate process may change."""
     gc.set_threshold(_OBJECTS)
+    sys.warnoptions.append(_NOT_LEAKED)
     for ending in (signal.SIGINT, signal.SIGTERM):  # both end as cleanly, with the work that was started
         if signal.getsignal(ending) != signal.SIG_IGN:
             signal.signal(ending, _interrupt)
