@@ -13,6 +13,7 @@ import spirillum as sp
 from spirillum.notes import note_attributes
 from spirillum.papers import biorob2012
 from spirillum.papers.claim import Claim
+from spirillum.results.page import draw_pictures
 from spirillum.results.study import write_report
 from spirillum.results.study_content import FRICTION_MEANINGS
 from spirillum.robot.tables import FrictionModel
@@ -235,3 +236,15 @@ def test_a_study_without_figures_gets_them_by_a_rerun(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "report.html").exists()
     sp.study(study, output=tmp_path / "out")
     assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_figure_that_is_removed_while_the_report_is_written_gets_a_sentence(tmp_path: Path) -> None:
+    """As by somebody who tidies up the folder."""
+    pictures = {name: Picture.of(name, "", name, lambda: new_figure(2.0, 1.0)) for name in ("first", "second")}
+
+    def tidy_up(name: str, _done: int) -> None:
+        if name == "second":
+            (tmp_path / "figures" / "first.png").unlink()
+
+    with pytest.raises(sp.InputError, match=r"first\.png was removed while the report was written; allowed: to leave"):
+        draw_pictures(pictures, tmp_path, tidy_up)

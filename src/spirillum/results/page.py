@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from spirillum.errors import InputError
 from spirillum.files import output_folder
 
 if TYPE_CHECKING:
@@ -57,10 +58,15 @@ def draw_pictures(
     found = []
     for name, picture in pictures.items():
         paths = written[name]
-        if vector and paths[-1].stat().st_size <= largest_svg:
-            source = data_uri(paths[-1].read_bytes(), "svg+xml")
-        else:
-            source = data_uri(paths[0].read_bytes(), "png")
+        try:
+            if vector and paths[-1].stat().st_size <= largest_svg:
+                source = data_uri(paths[-1].read_bytes(), "svg+xml")
+            else:
+                source = data_uri(paths[0].read_bytes(), "png")
+        except FileNotFoundError as error:
+            raise InputError(
+                f"{error.filename} was removed while the report was written; allowed: to leave it"
+            ) from error
         files = tuple(f"figures/{path.name}" for path in paths)
         found.append(EmbeddedPicture(name, picture.title, picture.caption, picture.alternative, source, files))
     return found
