@@ -209,9 +209,9 @@ def _virtual(truth: Drawn, variant: str) -> Scene:
     frames = FrameEncoder(painter, clean, trajectory, camera.exposure)
 
     def middle(time: float) -> np.ndarray:
-        return np.asarray(lens.seen(trajectory.at(time).position[None])[0, :2])
+        return np.asarray(lens.project(trajectory.at(time).position[None])[0, :2])
 
-    ends = lens.seen(trajectory.at(0.0).position + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
+    ends = lens.project(trajectory.at(0.0).position + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
     name, text = _named(truth)
     height = float(trajectory.position[:, 2].mean())
     tables = tomllib.loads(setup_text(name, camera, lens, tank.spacing, (height, 0.0), timed=True))

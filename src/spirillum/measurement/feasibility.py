@@ -14,7 +14,6 @@ from spirillum.errors import InputError, check_range
 from spirillum.measurement.setup_template import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
 from spirillum.notes import Note
-from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
 from spirillum.vision.camera.camera import opened, scale_of
@@ -58,14 +57,9 @@ class Check:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        return {
-            "name": self.name,
-            "value": quantity(self.value, self.unit),
-            "limit": quantity(self.limit, self.unit),
-            "passed": self.passed,
-            "decides": self.decides,
-            "sentence": self.sentence,
-        }
+        numbers = {"value": quantity(self.value, self.unit), "limit": quantity(self.limit, self.unit)}
+        words = {"passed": self.passed, "decides": self.decides, "sentence": self.sentence}
+        return {"name": self.name, **numbers, **words}
 
 
 @dataclass(frozen=True, repr=False)
@@ -153,10 +147,7 @@ def feasibility(
     for name, value in (("view-width", view_width), ("width", picture_width)):
         if video is not None and value is not None:
             raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")
-    chosen, robot = load_setup(setup)
-    if overrides:
-        beside = Path(setup).parent / chosen.robot.file
-        robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
+    chosen, robot = load_setup(setup, overrides)
     expected, caution = _expected(robot, tail_rate, body_rate, speed)
     film = None if video is None else opened(video, chosen)
     rate, source_of_rate = _first(
@@ -176,10 +167,7 @@ def feasibility(
     width = _WIDTH if picture_width is None else picture_width
     check_range("width", width, 32, 100_000, " pixels")
     pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, width, film)
-    expected |= {
-        "duration": (span, source_of_span),
-        "frames_per_second": (rate, source_of_rate),
-    }
+    expected |= {"duration": (span, source_of_span), "frames_per_second": (rate, source_of_rate)}
     expected |= {"length_per_pixel": (pixel, source)} if math.isfinite(pixel) else {}
     stripes = stripes_of(chosen, robot)
     shares = depth_shares(chosen)
@@ -267,15 +255,8 @@ def _rates(expected: Mapping[str, tuple[float, str]], rate: float, stripes: tupl
     limits = [("tail-rate", "tail", tail, UNWRAPPING.largest_step * rate * Hz, "a helix looks the same after a turn")]
     if stripes:
         share = pattern_period(stripes) / Hz
-        limits.append(
-            (
-                "body-rate",
-                "body",
-                body,
-                UNWRAPPING.largest_step * rate * share * Hz,
-                f"the stripes repeat after {share:.3g} turns",
-            )
-        )
+        most, why = UNWRAPPING.largest_step * rate * share * Hz, f"the stripes repeat after {share:.3g} turns"
+        limits.append(("body-rate", "body", body, most, why))
     else:
         sentence = "the robot has no stripes: the body's rotation cannot be seen"
         found.append(Check("body-rate", body, 0.0, "rad/s", passed=False, decides=True, sentence=sentence))
@@ -294,10 +275,8 @@ def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Chec
     """Checks of sizes in the picture; decisive where robot or ruler are too small to be detected."""
     if not math.isfinite(pixel):
         return []
-    sizes = {
-        "wire": ("the wire", robot.tail.wire_diameter),
-        "amplitude": ("the helix's amplitude", robot.tail.amplitude),
-    }
+    tail = robot.tail
+    sizes = {"wire": ("the wire", tail.wire_diameter), "amplitude": ("the helix's amplitude", tail.amplitude)}
     if stripes:
         sizes["stripe"] = ("a stripe that faces the camera", math.pi * robot.body.diameter / stripes)
     if setup.markers.spacing is not None:

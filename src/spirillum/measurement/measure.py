@@ -32,7 +32,6 @@ from spirillum.measurement.setup_template import scale_confirmed, setup_remarks
 from spirillum.measurement.statistics import NORMAL, mean_with_interval
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial, trial_of
 from spirillum.notes import Note
-from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.flag import Flag
@@ -316,24 +315,15 @@ def measurement_of(
     interrupted: bool = False,
 ) -> Measurement:
     """All trials compared with each other, and their summary."""
-    compared_trials = compared(trials)
-    return Measurement(
-        tuple(compared_trials),
-        summary_of(compared_trials),
-        asked.robot,
-        asked.setup_file,
-        tuple(failures),
-        interrupted=interrupted,
-    )
+    found = tuple(compared(trials))
+    summary, failed = summary_of(found), tuple(failures)
+    return Measurement(found, summary, asked.robot, asked.setup_file, failed, interrupted=interrupted)
 
 
 def _loaded(
     setup: str | Path, overrides: Mapping[str, Any] | None, start: float | None, end: float | None
 ) -> tuple[Setup, Robot]:
-    chosen, robot = load_setup(setup)
-    if overrides:
-        beside = Path(setup).parent / chosen.robot.file
-        robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
+    chosen, robot = load_setup(setup, overrides)
     first = chosen.start if start is None else float(start)
     last = chosen.end if end is None else float(end)
     if not (math.isfinite(first) and first >= 0):
@@ -364,9 +354,8 @@ def _resolved(path: Path) -> Path:
     try:
         return path.resolve()
     except (OSError, RuntimeError) as error:
-        raise InputError(
-            f"video = {str(path)[:200]!r} is a loop of links; allowed: a film, or a folder of images"
-        ) from error
+        words = f"video = {str(path)[:200]!r} is a loop of links; allowed: a film, or a folder of images"
+        raise InputError(words) from error
 
 
 def _clash(one: str, other: str) -> bool:
@@ -398,6 +387,4 @@ def _readings(
 
 def _in_pixels(marks: Marks | None) -> bool:
     """Whether a reading is in pixels and needs a scale."""
-    import numpy as np
-
     return marks is not None and bool(np.isfinite(marks.pixels[:, 0]).any())

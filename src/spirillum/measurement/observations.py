@@ -85,7 +85,10 @@ class RobotObservations:
 def read_observations(path: str | Path) -> list[ObservationRow]:
     """Read and check an observations file."""
     table = observation_table(path)
-    _check_header(table)
+    check_known(table, COLUMNS)
+    check_present(table, _NEEDED)
+    if not set(table.header) & set(RATES):
+        raise InputError(f"{table.path} has no measured column; allowed: at least one of {', '.join(RATES)}")
     found = [_observation(row) for row in table.rows()]
     _check_duplicates(table.path, found)
     check_motor_rates(table.path, all_rates(found))
@@ -118,14 +121,6 @@ def unread_columns(table: Table) -> tuple[Note, ...]:
     return (Note("input-unused", words, names),)
 
 
-def _check_header(table: Table) -> None:
-    path, header = table.path, table.header
-    check_known(table, COLUMNS)
-    check_present(table, _NEEDED)
-    if not set(header) & set(RATES):
-        raise InputError(f"{path} has no measured column; allowed: at least one of {', '.join(RATES)}")
-
-
 def _observation(row: TableRow) -> ObservationRow:
     place = row.place
     channel_diameter, wavelength, amplitude = (_number(row, name, _MM, least=1e-6) for name in _KEYS)
@@ -146,20 +141,9 @@ def _observation(row: TableRow) -> ObservationRow:
     if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
         d = math.hypot(b, c) if trials == 1 else b + c
     return ObservationRow(
-        row=row.line,
-        robot=row.text("robot"),
-        channel_diameter=channel_diameter,
-        wavelength=wavelength,
-        amplitude=amplitude,
-        forward_velocity=velocity,
-        tail_rate=tail,
-        body_rate=body,
-        motor_rate=motor,
-        trials=trials,
-        intervals=(a, b, c, d),
-        trial=row.text("trial"),
-        motor_derived=motor_derived,
-    )
+        row.line, row.text("robot"), channel_diameter, wavelength, amplitude, velocity, tail, body, motor,
+        trials, (a, b, c, d), row.text("trial"), motor_derived,
+    )  # fmt: skip
 
 
 def _number(row: TableRow, name: str, factor: float, least: float | None = None) -> float:

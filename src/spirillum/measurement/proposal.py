@@ -153,16 +153,8 @@ def propose_setup(
     if target is not None:
         new_file(target, text, overwrite=overwrite)
     warnings = tuple(_warnings(video, seen_there, findings, apart))
-    return Proposal(
-        video.name,
-        video.size,
-        name,
-        findings,
-        tuple(open_fields.items()),
-        text,
-        None if target is None else str(target),
-        warnings,
-    )
+    file = None if target is None else str(target)
+    return Proposal(video.name, video.size, name, findings, tuple(open_fields.items()), text, file, warnings)
 
 
 def _relative_to_setup(file: Path, target: Path) -> str:
@@ -211,20 +203,16 @@ def _findings(
         pixels=((tuple(rear), tuple(nose)),),
     )  # fmt: skip
     behind = "its tail is seen behind it" if sure else "a guess, for its tail is hardly seen behind it"
+    towards = found.direction if found.direction in ("up", "down") else f"to the {found.direction}"
     yield Finding(
         "direction", found.direction, "", "clear" if sure else "doubtful",
-        f"the nose points {_towards(found.direction)}: {behind}", "robot.direction",
+        f"the nose points {towards}: {behind}", "robot.direction",
         ((tuple(rear), tuple(nose)),),
     )  # fmt: skip
     yield _travel(found)
     yield _appearance(found)
     yield _stripes(found)
     yield _walls(found, robot)
-
-
-def _towards(direction: str) -> str:
-    """A direction of the picture after "points"."""
-    return direction if direction in ("up", "down") else f"to the {direction}"
 
 
 def _frame_rate(video: Video, *, timed: bool) -> Finding:
@@ -332,13 +320,9 @@ def _scale_lines(found: SetupFreeDetection, robot: Robot, spacing: float | None)
     pixel = found.optics.length_per_pixel
     half = 0.5 * robot.body.length / pixel
     share = math.hypot(SIZE.build_error, SIZE.edge_error / half)
-    return {
-        "markers.length_per_pixel": (f'"{1e3 * pixel:.6g} mm"', "CHECK: no ruler was found; by the body's length"),
-        "markers.length_per_pixel_uncertainty": (
-            f'"{1e3 * share * pixel:.3g} mm"',
-            "by how well it was built and seen",
-        ),
-    }
+    found_by = f'"{1e3 * pixel:.6g} mm"', "CHECK: no ruler was found; by the body's length"
+    unsure = f'"{1e3 * share * pixel:.3g} mm"', "by how well it was built and seen"
+    return {"markers.length_per_pixel": found_by, "markers.length_per_pixel_uncertainty": unsure}
 
 
 def _warnings(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -132,15 +133,14 @@ class Setup(Section):
         return self
 
 
-def load_setup(path: str | Path) -> tuple[Setup, Robot]:
-    """Read a setup file and the robot that it names."""
+def load_setup(path: str | Path, overrides: Mapping[str, Any] | None = None) -> tuple[Setup, Robot]:
+    """Read a setup file and the robot that it names, with dotted fields of the robot in place of its own."""
     path = Path(path)
     checked = problems_in(Setup, read_toml(path, WHAT))
     if isinstance(checked, list):
         raise refused_table(checked, str(path))
-    name = checked.robot.file
-    beside = path.parent / name
-    robot = load(beside if beside.is_file() else name)
+    beside = path.parent / checked.robot.file
+    robot = load(beside if beside.is_file() else checked.robot.file, **(overrides or {}))
     robot.check_body("the tracker, which follows the body's outline,")
     return checked, robot
 

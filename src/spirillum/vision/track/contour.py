@@ -92,25 +92,10 @@ class Contour:
             displacement along each normal by (x, y, heading), pixels per m and per rad (n, 3).
         """
         count = len(self.group)
-        pixels, directions, size, slopes = (
-            np.empty((count, 2)),
-            np.empty((count, 2)),
-            np.empty(count),
-            np.empty((count, 3)),
-        )
-        edge_places(
-            np.array(pose, dtype=float),
-            self._factors,
-            self.normals,
-            self._reach,
-            optics.axis_height,
-            optics.numbers,
-            pixels,
-            directions,
-            size,
-            slopes,
-        )
-        return pixels, directions, size, slopes
+        found = np.empty((count, 2)), np.empty((count, 2)), np.empty(count), np.empty((count, 3))
+        at = np.array(pose, dtype=float)
+        edge_places(at, self._factors, self.normals, self._reach, optics.axis_height, optics.numbers, *found)
+        return found
 
 
 def contour_of(robot: Robot, optics: Optics) -> Contour:

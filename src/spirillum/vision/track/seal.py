@@ -76,23 +76,10 @@ class SealEdges:
             known = (found.distance > 0.0) & np.isfinite(found.share[:, 0])
             return SealShifts(self._areas(found.share), known, np.ones(count), found.kind)
         shifts, known, variance = np.empty(count), np.empty(count, dtype=bool), np.empty(count)
-        seal_shifts(
-            found.share,
-            found.distance,
-            found.kind,
-            self._ends,
-            self._bias,
-            self._design,
-            self._inverses,
-            self._starts,
-            self._steepness,
-            OUTLINE.largest_shift,
-            *SEAL.strengths,
-            OUTLINE.rounding_noise / SEAL.noise,
-            shifts,
-            known.view(np.uint8),
-            variance,
-        )
+        template = self._ends, self._bias, self._design, self._inverses, self._starts
+        limits = self._steepness, OUTLINE.largest_shift, *SEAL.strengths, OUTLINE.rounding_noise / SEAL.noise
+        profiles = found.share, found.distance, found.kind
+        seal_shifts(*profiles, *template, *limits, shifts, known.view(np.uint8), variance)
         return SealShifts(shifts, known, variance, found.kind)
 
     def learn_colours(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
@@ -168,22 +155,10 @@ class SealEdges:
         """Share of the stripe's colour across each edge."""
         colours, count = self._colours(part, pixels, normals), len(pixels)
         share, distance, kind = np.empty(colours.shape[1:]), np.empty(count), np.empty(count, dtype=np.int64)
-        seal_shares(
-            colours,
-            self._offsets,
-            self._ends,
-            np.empty((0, 3)) if self._palette is None else self._palette,
-            self._ground,
-            SEAL.beside,
-            SEAL.distinct,
-            STRIPES.white,
-            SEAL.fewest_of_kind,
-            SEAL.pooled,
-            np.empty((2, 3, count)),
-            share,
-            distance,
-            kind,
-        )
+        palette = np.empty((0, 3)) if self._palette is None else self._palette
+        limits = SEAL.beside, SEAL.distinct, STRIPES.white, SEAL.fewest_of_kind, SEAL.pooled
+        known = colours, self._offsets, self._ends, palette, self._ground
+        seal_shares(*known, *limits, np.empty((2, 3, count)), share, distance, kind)
         return _Profiles(share, distance, kind)
 
     def _rows(self, flank: bool) -> slice:  # noqa: FBT001 - of `_FLANKS`

@@ -149,9 +149,9 @@ class Stripes:
             self.flags = (Flag.named("line-unreadable", count=count, frames=len(fits)),)
         elif self._typical_loss(fits) >= STRIPES.fits or contrast < SINGLE_LINE.kept * first:
             counts = np.bincount(self.order, minlength=2)
-            fewest, most = self.names[int(np.argmin(counts))], self.names[int(np.argmax(counts))]
+            thin, bare = self.names[int(np.argmin(counts))], self.names[int(np.argmax(counts))]
             wide = 360.0 * counts.min() / counts.sum()
-            self.flags = (Flag.named("line-does-not-fit", wide=wide, line=fewest, seal=most),)
+            self.flags = (Flag.named("line-does-not-fit", wide=wide, line=thin, seal=bare),)
         else:
             self.fits = True
 
