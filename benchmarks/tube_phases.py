@@ -18,7 +18,7 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.nodes import LARGEST_YAW, STEEPEST, Places
 from spirillum.fluid.tube.outer_resistance import (
@@ -76,7 +76,7 @@ def main() -> None:
         RobotBatch.of(sp.load(arguments.robot, **{"tail.wavelength": f"{length:g} mm"}))
         for length in arguments.wavelength
     ]
-    places = Places(RobotGeometry.of(batches[0]), tube_radius(batches[0]))
+    places = Places(*in_tube(batches[0]))
     yaw = arguments.yaw * places.largest_yaw(arguments.t, arguments.f)
     pose = places.pose_between(arguments.t, arguments.f, yaw)
     film = np.empty((6, 6))

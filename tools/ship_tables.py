@@ -13,7 +13,7 @@ from pathlib import Path
 
 import spirillum
 from spirillum.fluid.tube.building import built_tables
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.papers.biorob2012.published import paper_study
 from spirillum.robot.batch import RobotBatch
@@ -38,7 +38,7 @@ def main() -> None:
             continue
         batch = RobotBatch.of(robot)
         group = robot.name.removeprefix("biorob2012-"), round(1e3 * robot.tail.amplitude, 6)
-        groups.setdefault(group, []).append((RobotGeometry.of(batch), tube_radius(batch)))
+        groups.setdefault(group, []).append(in_tube(batch))
     for (channel, amplitude), robots in groups.items():
         if arguments.channel not in (None, channel) or arguments.amplitude not in (None, amplitude):
             continue

@@ -108,6 +108,22 @@ def as_number(value: Any) -> float:
         return math.nan
 
 
+def as_duty(duty: Any) -> float:
+    """A duty of the drive as a number; refused outside 0 to 1."""
+    number = as_number(duty)
+    if not 0.0 <= number <= 1.0:
+        raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
+    return number
+
+
+def as_step(dt: Any, longest: float) -> float:
+    """A time to step by as a number, s; refused from 0 down and beyond the longest."""
+    number = as_number(dt)
+    if not 0.0 < number <= longest:
+        raise InputError(f"dt = {clipped(dt)}; allowed: above 0, at most {longest:g} s")
+    return number
+
+
 def number_array(name: str, value: Any, allowed: str = "numbers") -> Samples:
     """A number, or numbers of any shape, as an array of floats."""
     found = _array_of(name, value, "iuf", allowed)

@@ -10,7 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.fluid.tube import library
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.outer_resistance import even_phases, matrix_of
@@ -83,7 +83,7 @@ def test_a_tail_of_the_other_hand_swims_as_its_mirror_image(name: str) -> None:
 def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None:
     study = load_study(paper_study())
     batches = [RobotBatch.of(study.robot_at(index)) for index in range(study.count)]
-    keys = {key_of(RobotGeometry.of(batch), tube_radius(batch)) for batch in batches}
+    keys = {key_of(*in_tube(batch)) for batch in batches}
     files = list((Path(library.__file__).parent / "tables").glob("*.table"))
     assert len(files) == 32
     for path in files:

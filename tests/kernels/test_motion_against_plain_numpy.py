@@ -7,9 +7,8 @@ from scipy.spatial.transform import Rotation
 
 import spirillum as sp
 from spirillum.dynamics.free_robot import packed
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core
 from spirillum.kernels.core import resistance_at
 from spirillum.robot.batch import RobotBatch
@@ -125,7 +124,7 @@ def test_rates_without_a_tube(kind: float, fixed: float, gap: float) -> None:
 @pytest.fixture(scope="module")
 def table() -> np.ndarray:
     batch = RobotBatch.of(sp.load("biorob2012-wide"))
-    found = find_table(RobotGeometry.of(batch), tube_radius(batch))
+    found = find_table(*in_tube(batch))
     assert found is not None
     return found.packed
 

@@ -5,9 +5,8 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator, BSpline
 
 import spirillum as sp
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core, tube_table
 from spirillum.robot.batch import RobotBatch
 
@@ -15,7 +14,7 @@ from spirillum.robot.batch import RobotBatch
 @pytest.fixture(scope="module", params=["biorob2012-wide", "biorob2012-narrow"])
 def table(request: pytest.FixtureRequest) -> np.ndarray:
     batch = RobotBatch.of(sp.load(request.param))
-    found = find_table(RobotGeometry.of(batch), tube_radius(batch))
+    found = find_table(*in_tube(batch))
     assert found is not None
     return found.packed
 

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 from spirillum.dynamics.free_robot import packed
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core, native
 from spirillum.kernels.core import contact_offset, film_coordinates, spline_weights
 
@@ -50,7 +49,7 @@ def test_optimised_sources_compile_without_a_warning(build: dict[str, Any], tmp_
 
 def test_every_build_finds_the_same_numbers(strict: Path, wide: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without fused products or sums in another order, so that a run is the same on every processor."""
-    table = find_table(RobotGeometry.of(wide, 0), tube_radius(wide, 0)).packed
+    table = find_table(*in_tube(wide)).packed
     rng = np.random.default_rng(1)
     poses = [(*rng.uniform([2e-3, -0.05, -0.03], [6e-3, 0.05, 0.03]), phase) for phase in range(10)]
     half, other = rng.normal(size=(7, 7)), rng.uniform(size=(7, 7))

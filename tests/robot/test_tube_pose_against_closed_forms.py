@@ -249,8 +249,8 @@ def test_contact_nose_down_and_yawed() -> None:
     """A ball with a rod behind it, lying: nose down the rod's end touches the roof, yawed it touches sooner."""
     rod = np.stack([np.linspace(-0.0275, -0.0875, 61), np.zeros(61), np.zeros(61)], axis=-1)
     gap, e = 5e-4, R - 0.009 - 5e-4
-    down = contact_pitch(SHAPES["sphere"], rod, 0.0005, R, gap, nose_down=True)
-    assert down == pytest.approx(-np.arcsin((R - 0.0005 + e) / 0.0875), abs=1e-9)
+    down = TubePose.at_gap(SHAPES["sphere"], R, gap, -np.arcsin((R - 0.0005 + e) / 0.0875))
+    assert down.tail_clearance(rod, 0.0005).clearance == pytest.approx(0.0, abs=1e-10)
     up, yawed = (contact_pitch(SHAPES["sphere"], rod, 0.0005, R, gap, yaw=yaw) for yaw in (0.0, 0.05))
     assert 0 < yawed < up
     where = np.array([-0.0875 * np.cos(yawed) * np.sin(0.05), -e - 0.0875 * np.sin(yawed)])

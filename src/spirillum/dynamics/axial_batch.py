@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.argument_validation import as_number, check_kind, validate_arguments
+from spirillum.argument_validation import as_number, as_step, check_kind, validate_arguments
 from spirillum.arrays import Samples
 from spirillum.dynamics.axial_robot import PARAMETERS, STATES, AxialRobot, axial_robot, motion, responses
 from spirillum.errors import InputError, clipped, did_you_mean
@@ -249,7 +249,7 @@ class AxialBatch:
         Raises:
             InputError: for wrong input, or a motion far outside Stokes flow; nothing has then moved.
         """
-        number = _time(dt)
+        number = as_step(dt, _LONGEST)
         if remote is not None:
             if duty is not None:
                 raise InputError("remote and duty are given together; allowed: one of them")
@@ -320,10 +320,3 @@ class AxialBatch:
 def _check_whole(name: str, value: Any, low: int, high: int) -> None:
     if not is_whole(value) or not low <= int(value) <= high:
         raise InputError(f"{name} = {clipped(value)}; allowed: a whole number from {low} to {high}")
-
-
-def _time(dt: Any) -> float:
-    number = as_number(dt)
-    if not 0.0 < number <= _LONGEST:
-        raise InputError(f"dt = {clipped(dt)}; allowed: above 0, at most {_LONGEST:g} s")
-    return number

@@ -13,6 +13,7 @@ from spirillum.dynamics.run_file import attitudes_of, numbers_of, open_run, robo
 from spirillum.errors import InputError, check_choice
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
+from spirillum.fluid.registry import quickest
 from spirillum.fluid.tube.progress_messages import OF_A_RUN, solution_message
 from spirillum.fluid.tube.tube import Tube
 from spirillum.notes import Note, note_attributes, notes_in
@@ -160,7 +161,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
         batch = RobotBatch.of(robot, Placement.of({**requested, "gap": drawn}))
-        check_domain(robot, Tube(), batch)
+        check_domain(robot, quickest(Tube(), batch), batch)
     except InputError as error:  # in terms of the run, not of a placement
         own = re.sub(r"placement\.(\w+)", lambda found: _OWN_NAMES.get(found[1], found[0]), str(error))
         raise InputError(f"the run: {own}") from error

@@ -49,13 +49,11 @@ _STIFFEST = 1e10  # Largest resistance of a film over that of the robot, so that
 
 
 def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> tuple[Samples, Samples]:
-    """The channel's wall and the rings of a robot that may near it, as csrc/two_links.c reads them.
-
-    The wall (4,): radius of the channel (infinite: none), roughness, largest resistance of a film, and the load that
-    halves a film as thick as the roughness. Rings (n, 6): x, radius, half-length along the axis, resistance, power,
-    reach. A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not
-    at all beyond its reach, where the resistance in open fluid is all there is.
-    """
+    """The channel's wall and the rings of a robot that may near it, as csrc/two_links.c reads them."""
+    # The wall (4,): radius of the channel (infinite: none), roughness, largest resistance of a film, and the load that
+    # halves a film as thick as the roughness. Rings (n, 6): x, radius, half-length along the axis, resistance, power,
+    # reach. A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not
+    # at all beyond its reach, where the resistance in open fluid is all there is.
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:

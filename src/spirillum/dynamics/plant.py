@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.argument_validation import as_number, check_kind, validate_arguments
+from spirillum.argument_validation import as_duty, as_number, as_step, check_kind, validate_arguments
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot, TwoLinks, two_links
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTERRUPTED, Checkpoint, Reach, Trajectory, integrate
@@ -27,7 +27,7 @@ from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError
 from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
@@ -250,7 +250,7 @@ class Plant:
             InputError: for wrong input, a run that has ended, or a motion far outside Stokes flow; nothing has then
                 moved.
         """
-        _check_number("dt", dt, 0.0, _LONGEST, "s")
+        dt = as_step(dt, _LONGEST)
         if self._now.time + dt == self._now.time:
             raise InputError(f"dt = {dt:g} s is none at t = {self._now.time:g} s; allowed: above its rounding error")
         if self._now.ended:
@@ -265,7 +265,7 @@ class Plant:
         if asked_field is not None:
             self.impose_field(asked_field)
         requested = 0.0 if self._now.spent else command
-        run = self._moved(float(dt), requested)
+        run = self._moved(dt, requested)
         try:
             self._check_stokes(run)
         except InputError:
@@ -275,18 +275,16 @@ class Plant:
         ended = ""
         if run.time[-1] < (self._now.time + dt) * (1.0 - 1e-9):
             ended = run.events[-1].what if run.events else "the equations have no next step"
-        self._now = PlantState(
-            float(run.time[-1]),
-            tuple(run.states[-1].tolist()),
-            requested,
-            command,
-            self._now.flow,
-            self._now.field,
-            spent,
-            ended,
-            self._azimuth(run),
-            run.last,
-            self.model,
+        self._now = replace(
+            self._now,
+            time=float(run.time[-1]),
+            state=tuple(run.states[-1].tolist()),
+            duty=requested,
+            command=command,
+            spent=spent,
+            ended=ended,
+            azimuth=self._azimuth(run),
+            checkpoint=run.last,
         )
         return self._moment(run)
 
@@ -364,10 +362,7 @@ class Plant:
             if not isinstance(remote, (bool, np.bool_)):
                 raise InputError(f"remote = {str(remote)[:40]}; allowed: True or False")
             return self._first.command if remote else 0.0
-        if duty is not None:
-            _check_number("duty", duty, 0.0, 1.0, "", closed=True)
-            return float(duty)
-        return self._now.command
+        return self._now.command if duty is None else as_duty(duty)
 
     def _moved(self, dt: float, duty: float) -> Trajectory:
         now = self._now
@@ -401,11 +396,3 @@ class Plant:
         )
         values = {name: float(column[-1]) for name, column in series.items()}
         return Snapshot(float(run.time[-1]), pose, values, self._now.ended)
-
-
-def _check_number(name: str, value: Any, low: float, high: float, unit: str, *, closed: bool = False) -> None:
-    """Refuse what is no number from `low` to `high`, `low` itself excluded unless closed."""
-    number = as_number(value)
-    if not (low <= number <= high) or (number == low and not closed):
-        allowed = f"a number from {low:g} to {high:g}" if closed else f"above {low:g}, at most {high:g} {unit}".strip()
-        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")

@@ -182,12 +182,10 @@ def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> 
 def run_averages(
     time: Samples, integrals: Mapping[str, tuple[Samples, str]], stretches: Sequence[DutyInterval], *, by_turn: bool
 ) -> dict[str, tuple[Any, ...]]:
-    """Averages as scalars of a dataset, from integrals of quantities at the samples (and the averages' units).
-
-    `mean_...` is over the last two thirds of the run, the final two of the paper's three periods, `..._on` over the
-    times at which the drive is on, `..._steady` over those of them at which the motion is steady (see `STEADY`); NaN
-    where there are none. With `by_turn` speed and rate change within a turn of the tail.
-    """
+    """Averages as scalars of a dataset, from integrals of quantities at the samples (and the averages' units)."""
+    # `mean_...` is over the last two thirds of the run, the final two of the paper's three periods, `..._on` over the
+    # times at which the drive is on, `..._steady` over those of them at which the motion is steady (see `STEADY`); NaN
+    # where there are none. With `by_turn` speed and rate change within a turn of the tail.
     judged = [integrals[name][0] for name in ("mean_forward_velocity", "mean_tail_rotation_rate")]
     steady = [part for stretch in stretches if (part := _steady_part(time, judged, stretch, by_turn=by_turn))]
     whole = [DutyInterval(float(time[0] + (time[-1] - time[0]) / 3.0), float(time[-1]))]

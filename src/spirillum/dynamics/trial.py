@@ -314,10 +314,12 @@ class TrialRequest:
 
     def check(self, model: str, tail_rate: str | float | None, *, wanted: bool) -> None:
         """Refuse what no trial can have, before the held answer is computed."""
-        robot = self.fit.central(self.robot)
-        reason = why_not_released(robot, model, tail_rate, self.fit.placed(robot, Placement.of(self.placement)))
-        if not wanted or reason:
-            self._check_unused(reason)
+        if self._given:
+            robot = self.fit.central(self.robot)
+            placed = self.fit.placed(robot, Placement.of(self.placement))
+            reason = why_not_released(robot, model, tail_rate, placed)
+            if not wanted or reason:
+                self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
         release, channel = self._release, self.robot.channel
@@ -457,8 +459,9 @@ class TrialRequest:
         if self.progress is not None and speed is not None:
             self.progress(f"{SPEED_OF}{column}: {show(speed, speed_unit(speed, rate))}", 1, 1)
 
-    def _check_unused(self, reason: str) -> None:
-        """Refuse settings of a released motion for an answer without one, with the reason."""
+    @property
+    def _given(self) -> dict[str, str | bool]:
+        """Settings of a released motion, as they were given."""
         stated = (one for one in field_values(self.in_tube) if one.path in self.in_tube.model_fields_set)
         given = {
             "roughness": None if self.roughness is None else as_given(self.roughness, "m"),
@@ -466,10 +469,13 @@ class TrialRequest:
             "interval": self.interval or None,
             **{f"in_tube.{one.path}": one.text for one in stated if one.value is not None},
         }
-        for name, value in given.items():
-            if value is not None:
-                why = f" ({reason})" if reason else ""
-                raise InputError(
-                    f"{name} = {value} is of released motion in the tube, which this request does not "
-                    f"compute{why}; allowed: with model 'tube', without tail rate and motion 'held'"
-                )
+        return {name: value for name, value in given.items() if value is not None}
+
+    def _check_unused(self, reason: str) -> None:
+        """Refuse settings of a released motion for an answer without one, with the reason."""
+        for name, value in self._given.items():
+            why = f" ({reason})" if reason else ""
+            raise InputError(
+                f"{name} = {value} is of released motion in the tube, which this request does not "
+                f"compute{why}; allowed: with model 'tube', without tail rate and motion 'held'"
+            )

@@ -40,14 +40,10 @@ def tube_run(
     wait: float = 0.0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The run of a robot in its tube from a state, (19,), or from where an earlier one ended.
-
-    It is a free run with pose and contacts, and a `checkpoint` to continue from.
-
-    Time 0 is when the remote may first switch the drive on. A robot that waits before, with its drive off, does so at
-    negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while it
-    waited is among the events. A flow over time has the value of its first row until then.
-    """
+    """The run of a robot in its tube from a state, (19,), or from where an earlier one ended, with a `checkpoint`."""
+    # Time 0 is when the remote may first switch the drive on. A robot that waits before, with its drive off, does so at
+    # negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while
+    # it waited is among the events. A flow over time has the value of its first row until then.
     reach = reach_of(steady.robot)
     before: tuple[Event, ...] = ()
     moments = np.union1d(times.time, [switch.time for switch in times.switches])

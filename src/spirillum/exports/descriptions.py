@@ -268,7 +268,7 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
             "phase_at_zero": quantity(phase, "rad"),
             "friction": quantity(joint_friction(robot), "N m s/rad"),
         },
-        "links": {"body": _link_masses(links.body), "rotor": _link_masses(links.rotor)},
+        "links": {"body": link_masses(links.body), "rotor": link_masses(links.rotor)},
         "matrix": {**quantity(chosen.resistance(batch, np.zeros(1))[0], ""), "unit": _UNITS},
         "convention": _CONVENTION,
         "turning": _TURNING,
@@ -284,7 +284,7 @@ def joint_friction(robot: Robot) -> float:
     return own if robot.friction.reading == "body" else 0.0
 
 
-def _link_masses(link: Link) -> dict[str, Any]:
+def link_masses(link: Link) -> dict[str, Any]:
     """Inertia of one link, at phase 0 of the tail; null for an unknown mass."""
     return {
         "mass": quantity(link.mass, "kg"),

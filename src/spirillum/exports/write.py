@@ -21,6 +21,7 @@ from spirillum.exports.descriptions import (
     check_inertia,
     is_watertight,
     is_watertight_file,
+    link_masses,
     mesh_files,
     mjcf_text,
     sidecar_of,
@@ -219,12 +220,7 @@ class Export(DisplayMixin):
             "phase": quantity(self.phase, "rad"),
             "files": [{"file": str(item.path), "holds": item.holds} for item in self.files],
             "links": {
-                name: {
-                    "mass": quantity(link.mass, "kg"),
-                    "centre_of_mass": quantity(link.centre, "m"),
-                    "displaced_volume": quantity(link.volume, "m^3"),
-                    "centre_of_buoyancy": quantity(link.centroid, "m"),
-                }
+                name: {key: value for key, value in link_masses(link).items() if key != "inertia"}
                 for name, link in zip(("body", "rotor"), self.links, strict=True)
             },
             "pieces": [

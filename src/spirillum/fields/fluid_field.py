@@ -96,11 +96,9 @@ def add_tractions(
     field: Samples,
     moments: Samples | None = None,
 ) -> None:
-    """Add the flow of forces along wires and of a single layer in unbounded fluid to `field`: csrc/field.c.
-
-    Tractions are those of the panels' modes, (panels, p, modes, 3); velocity and pressure, (n, 4), are without the
-    factors 1/(8 pi mu) and 1/(8 pi).
-    """
+    """Add the flow of forces along wires and of a single layer in unbounded fluid to `field`: csrc/field.c."""
+    # Tractions are those of the panels' modes, (panels, p, modes, 3); velocity and pressure, (n, 4), are without the
+    # factors 1/(8 pi mu) and 1/(8 pi).
     from spirillum.kernels.core import add_blobs, add_layer, add_moments
 
     start = 0

@@ -247,10 +247,8 @@ def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: fl
 
 
 def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float) -> Iterator[_Sources]:
-    """Forces at Gauss points of one panel, on half circles about the robot's axis: the other half mirrors them.
-
-    Of a yawed robot, which has no mirror image in its tube, they stand on whole circles.
-    """
+    """Forces at Gauss points of one panel, on half circles about the robot's axis: the other half mirrors them."""
+    # Of a yawed robot, which has no mirror image in its tube, they stand on whole circles.
     panels, seat = solids.panels, solids.pose
     x_p, rho_p = panels.x[number], panels.rho[number]
     length = float(np.sum(np.hypot(np.diff(x_p), np.diff(rho_p))))

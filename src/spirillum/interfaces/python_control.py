@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.argument_validation import as_number
+from spirillum.argument_validation import as_duty
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.axial_robot import INPUTS, STATES, AxialRobot, axial_robot, motion, outputs, rates, slopes
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError
 from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
@@ -144,9 +144,7 @@ def linear_system(
     axial = axial_robot(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
-    at_duty = axial.duty if duty is None else as_number(duty)
-    if not 0.0 <= at_duty <= 1.0:
-        raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
+    at_duty = axial.duty if duty is None else as_duty(duty)
     if flow is not None and axial.flow is None:
         raise InputError(
             f"flow = {as_given(flow, 'm/s')} without one in the placement; allowed: placement with flow, or no flow"

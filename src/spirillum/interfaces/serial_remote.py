@@ -19,7 +19,7 @@ from functools import reduce
 from operator import xor
 from typing import Any, Self
 
-from spirillum.argument_validation import as_number, validate_arguments
+from spirillum.argument_validation import as_duty, as_number, validate_arguments
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_range, clipped
@@ -155,8 +155,7 @@ class SerialRemote:
         Raises:
             InputError: for what is no duty (nothing is then sent), an unplugged port, or no answer.
         """
-        _check_duty(duty)
-        answer = self._request("DUTY", f" {float(duty):.3f}")
+        answer = self._request("DUTY", f" {as_duty(duty):.3f}")
         try:
             return _number_in(answer.split(" ")[2], 1.0)
         except ValueError as error:
@@ -236,11 +235,6 @@ class SerialRemote:
         return None
 
 
-def _check_duty(duty: Any) -> None:
-    if not 0.0 <= as_number(duty) <= 1.0:
-        raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
-
-
 def _check_length(duration: Any) -> None:
     if not 0.0 < as_number(duration) <= _LONGEST_HOLD:
         raise InputError(f"duration = {as_given(duration, 's')}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
@@ -304,11 +298,11 @@ def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: i
         InputError: for wrong input, a port that is not there, in use or unplugged, or a remote that does not answer.
     """
     length = parse_option("duration", duration, KINDS["time"])
-    _check_duty(duty)
+    on = as_duty(duty)
     _check_length(length)
     with SerialRemote(port, baud=baud) as far_end:
-        far_end.hold(duty, length)
-        return RemoteRun(far_end.port, far_end.name, round(float(duty), 3), length, far_end.watchdog)
+        far_end.hold(on, length)
+        return RemoteRun(far_end.port, far_end.name, round(on, 3), length, far_end.watchdog)
 
 
 class VirtualRemote:

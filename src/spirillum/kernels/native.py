@@ -96,13 +96,9 @@ def sources_digest() -> str:
 
 
 def native(*written: str, rows: str = "") -> Callable[[_F], _F]:
-    """Turn a stub into a call of the C function of its name.
-
-    Args:
-        written: names of the arrays that the function writes to: these have to have the dtype of their annotation and
-            be contiguous; others are copied where they are not.
-        rows: a dimension, the first one of its arrays, over which threads may share the work.
-    """
+    """Turn a stub into a call of the C function of its name; threads may share the work over the dimension `rows`."""
+    # `written` are arrays that the function writes to: they need the dtype of their annotation, contiguous; others are
+    # copied where they are not.
 
     def decorate(stub: _F) -> _F:
         count = stub.__code__.co_argcount

@@ -17,6 +17,7 @@ from spirillum.robot.geometry import End, Shape
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.outline import profile_outline
 from spirillum.robot.placement import Placement
+from spirillum.robot.shape_input import source_of
 from spirillum.robot.tables import DriveKind, FrictionModel, RobotTables, TorqueCurve
 from spirillum.robot.tail_form import TailForm
 
@@ -225,18 +226,12 @@ class RobotBatch:
         if unknown:
             raise InputError(f"{unknown[0]} cannot vary in a batch; allowed: {', '.join(known)}")
         for path in values:
-            if (source := self._source_of(path)) is not None:
+            if (source := source_of(path, curve=bool(self.form.curve), profile=bool(self.profile))) is not None:
                 raise InputError(f"{path} follows from {source}; allowed: fields that it leaves open")
         arrays = {known[path][0]: _checked_column(known[path][1], value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
         return batch
-
-    def _source_of(self, path: str) -> str | None:
-        """The points from which a number follows; None for a number of its own."""
-        if self.form.curve and path in _OF_CURVE:
-            return "tail.curve"
-        return "body.profile" if self.profile and path in ("body.diameter", "body.length") else None
 
     @validate_arguments
     def blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
@@ -306,7 +301,6 @@ class RobotBatch:
         )
 
 
-_OF_CURVE = ("tail.wavelength", "tail.amplitude", "tail.length", "tail.taper")
 """Fields that follow from a centre line through points."""
 
 

@@ -307,11 +307,9 @@ def centreline(
     phase: Values,
     form: TailForm = PLAIN,
 ) -> Centreline:
-    """The wire of eq. (10): x = -x_r - xi, y = r cos(h k x + phi), z = r sin(h k x + phi).
-
-    All arguments broadcast; `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left). Where the wavelength
-    varies, k x is an integral from the root; on a centre line through points xi/L_t is its parameter, from 0 to 1.
-    """
+    """The wire of eq. (10): x = -x_r - xi, y = r cos(h k x + phi), z = r sin(h k x + phi); arguments broadcast."""
+    # `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left). Where the wavelength varies, k x is an
+    # integral from the root; on a centre line through points xi/L_t is its parameter, from 0 to 1.
     if form.curve:
         return _through_points(xi / length, root, length, hand, phase, form)
     wavenumber = 2.0 * np.pi / wavelength

@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Tensors, Vectors
-from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
@@ -79,17 +78,17 @@ def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None =
 
 def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
     """Volume, centroid and inertia of `body`, `coupling` (where there is one) and `tail`, each of density 1."""
-    batch = RobotBatch.of(robot)
     found = {name: revolution_solid(outline) for name, outline in outlines_of(robot).items()}
+    tail = robot.tail
     found["tail"] = wire_solid(
-        root=float(batch.root[0]),
-        wavelength=robot.tail.wavelength,
-        amplitude=robot.tail.amplitude,
-        length=robot.tail.length,
-        wire_diameter=robot.tail.wire_diameter,
-        taper=float(batch.taper[0]),
+        root=0.5 * robot.body.length + robot.coupling.length,
+        wavelength=tail.wavelength,
+        amplitude=tail.amplitude,
+        length=tail.length,
+        wire_diameter=tail.wire_diameter,
+        taper=np.inf if tail.taper is None else tail.taper,
         hand=robot.hand,
-        form=batch.form,
+        form=tail.form,
     )
     return found
 

@@ -31,6 +31,17 @@ DISPLACED = {
     "body.shape": ("profile",),
 }
 """Fields of the layer below that a field of a layer replaces."""
+
+
+def source_of(field: str, *, curve: bool, profile: bool) -> str | None:
+    """Field with the points from which a field follows, where there are any; None for one of its own."""
+    table, _, name = field.partition(".")
+    for source, there in (("tail.curve", curve), ("body.profile", profile)):
+        if there and source.startswith(f"{table}.") and name in DISPLACED[source]:
+            return source
+    return None
+
+
 _COLUMN = re.compile(r"(\w+?)(?:(?:[\s_]+|\s*(?=[\[(]))[\[(]?([a-zµμ]+)[\])]?)?")
 """The name of a column and the unit behind it."""
 _SMOOTHED = {"spread": 0.02, "amplitude": 0.05, "length": 0.05}

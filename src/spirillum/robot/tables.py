@@ -38,7 +38,7 @@ from spirillum.robot.fields import (
 )
 from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, CouplingOrNone, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
-from spirillum.robot.shape_input import DISPLACED
+from spirillum.robot.shape_input import source_of
 from spirillum.units import KINDS, show
 
 DriveKind = Literal["dc-motor", "rate", "torque", "torque-speed", "magnetic"]
@@ -254,11 +254,7 @@ class RobotTables(Section):
 
     def source_of(self, field: str) -> str | None:
         """Field with the points from which a field follows; None for one of its own."""
-        table, _, name = field.partition(".")
-        for source, points in (("tail.curve", self.tail.curve), ("body.profile", self.body.points)):
-            if points and source.startswith(f"{table}.") and name in DISPLACED[source]:
-                return source
-        return None
+        return source_of(field, curve=bool(self.tail.curve), profile=bool(self.body.points))
 
     @property
     def has_body(self) -> bool:

@@ -75,11 +75,8 @@ class TubePose:
     def at_gap(
         cls, body: Outline, radius: float, gap: float, pitch: float = 0.0, tail_drop: float = 0.0, yaw: float = 0.0
     ) -> TubePose:
-        """Return the pose at which the body's smallest distance to the wall is `gap`: the lower one of two.
-
-        For a level body of largest radius a, e = R - a - gap. The offset is NaN where the gap is larger than
-        `largest_gap`, as it is once the nose comes nearer to the top.
-        """
+        """The pose at which the body's least distance to the wall is `gap`: the lower one of two, NaN without one."""
+        # For a level body of largest radius a, e = R - a - gap.
         return cls(radius, _offset(body, radius, gap, pitch, yaw), pitch, tail_drop, yaw)
 
     @property
@@ -262,18 +259,13 @@ def contact_pitch(
     tail_drop: float = 0.0,
     clearance: float = 0.0,
     yaw: float = 0.0,
-    nose_down: bool = False,
 ) -> float:
-    """Largest pitch at which tail and coupling have a given clearance from the wall while the body's gap is fixed.
-
-    The nose is raised from level, or lowered, until the wire at any phase, or the coupling, comes to the clearance, or
-    until the nose leaves the body no pose with that gap; at most `STEEPEST_PITCH`. Rad, negative for a lowered nose;
-    NaN where a level robot does not fit.
-    """
-    sign = -1.0 if nose_down else 1.0
+    """Largest pitch at which tail and coupling have a clearance at a body's gap, rad; NaN: no level robot fits."""
+    # The nose is raised from level until the wire at any phase, or the coupling, comes to the clearance, or until the
+    # nose leaves the body no pose with that gap; at most `STEEPEST_PITCH`.
 
     def spare(pitch: float) -> float:
-        pose = TubePose.at_gap(body, radius, gap, sign * pitch, tail_drop, yaw)
+        pose = TubePose.at_gap(body, radius, gap, pitch, tail_drop, yaw)
         if np.isnan(pose.offset):
             return -radius
         tail = pose.tail_clearance(points, wire_radius).clearance
@@ -282,7 +274,7 @@ def contact_pitch(
 
     if spare(0.0) < -1e-12 * radius:
         return np.nan
-    return sign * last_clear(spare, STEEPEST_PITCH, _STEPS, _NARROWEST)
+    return last_clear(spare, STEEPEST_PITCH, _STEPS, _NARROWEST)
 
 
 def last_clear(spare: Callable[[float], float], most: float, steps: int, narrowest: float) -> float:

@@ -122,10 +122,8 @@ def force_free(m: AxialWhole, load: AxialLoad | None = None) -> TorqueBalance:
 
 
 def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
-    """Eliminate U, Omega_y and Omega_z: no force and no lateral torque acts on the whole robot, (n, 12, 12).
-
-    Return the torque balance about the motor axis, and U, Omega_y, Omega_z per rate of body and rotor, (n, 5, 2).
-    """
+    """The torque balance about the motor axis of (n, 12, 12), and U, Omega_y, Omega_z per rates, (n, 5, 2)."""
+    # U, Omega_y and Omega_z are eliminated: no force and no lateral torque acts on the whole robot.
     shared = np.swapaxes(_SPINS, 0, 1) @ r @ _SPINS
     rates: Samples = -np.asarray(np.linalg.solve(shared[..., :5, :5], shared[..., :5, 5:]), dtype=np.float64)
     s = shared[..., 5:, 5:] + shared[..., 5:, :5] @ rates
@@ -134,11 +132,9 @@ def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
 
 
 def body_per_tail(s: TorqueBalance, t: FrictionTorques | None = None) -> tuple[Values, Values]:
-    """Kinematics (15), from the sum of both torque rows, in which the joint torque cancels.
-
-    Return Omega/omega, and the rate Omega that an imposed flow adds, rad/s. NaN where reading `paper` has a B_eff
-    beyond E_x, which would push the tail backwards.
-    """
+    """Kinematics (15): Omega/omega, and the rate Omega that an imposed flow adds, rad/s."""
+    # From the sum of both torque rows, in which the joint torque cancels. NaN where reading `paper` has a B_eff beyond
+    # E_x, which would push the tail backwards.
     on_body, on_tail = s.bb + s.rb, s.br + s.rr
     if t is not None:
         on_body, on_tail = on_body + (t.bb + t.rb), on_tail + (t.br + t.rr)
@@ -172,20 +168,12 @@ def _determinant(s: TorqueBalance, t: FrictionTorques) -> Values:
 
 
 def friction_torques(reading: FrictionModel, effective: Values, rotor_friction: Values) -> FrictionTorques:
-    """The readings of eqs (18) and (19).
-
-    Args:
-        reading: `none`; `rotor`: B_eff inside the joint, as (18) says; `body`: B_m inside the joint and a wall
-            coefficient B on the body's rate; `paper`: as (19) is printed, tenable only as an external torque
-            -B_eff omega_m on the rotor.
-        effective: B_eff (it contains B_m), or B for `body`, N m s/rad.
-        rotor_friction: B_m, N m s/rad.
-    """
-    if reading == "rotor":
+    """The readings of eqs (18) and (19), by B_eff (it contains B_m), or B for `body`, and B_m, N m s/rad."""
+    if reading == "rotor":  # B_eff inside the joint, as (18) says
         return FrictionTorques(effective, -effective, -effective, effective, _ZERO)
-    if reading == "body":
+    if reading == "body":  # B_m inside the joint and a wall coefficient B on the body's rate
         joint, wall = rotor_friction, effective
         return FrictionTorques(joint + wall, -joint, -joint, joint, joint * wall)
-    if reading == "paper":
+    if reading == "paper":  # as (19) is printed, tenable only as an external torque -B_eff omega_m on the rotor
         return FrictionTorques(_ZERO, _ZERO, -effective, effective, _ZERO)
     return FRICTIONLESS

@@ -22,7 +22,7 @@ from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model, quickest
 from spirillum.fluid.tube.cache import check_cache_folder
-from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.library import TabledTube, find_table, has_table_cache, prepared_tables
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import RESPONSES, STAGES, StageName, stage_of
@@ -98,7 +98,7 @@ def models_without_answer(robot: Robot) -> list[str]:
 
 def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:
     """Whether the first robot of a batch, which has a channel, has a table for its tube, of a stage at least."""
-    return find_table(RobotGeometry.of(batch), tube_radius(batch), stage) is not None
+    return find_table(*in_tube(batch), stage) is not None
 
 
 _GAP_STEP = 1.02  # Ratio of gaps to which the least one that a model resolves is determined.
@@ -129,7 +129,7 @@ def prepared(
 def check_domain(robot: Robot, model: SwimmerModel, batch: RobotBatch) -> None:
     """Refuse a robot at its pose, a batch of one, outside a model's domain."""
     check_placement(batch.placement, model)
-    outside = broken(requirements(batch, quickest(model, batch)))
+    outside = broken(requirements(batch, model))
     if outside:
         raise InputError(
             f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_remedy(batch, model, outside)}"
@@ -138,7 +138,7 @@ def check_domain(robot: Robot, model: SwimmerModel, batch: RobotBatch) -> None:
 
 def _remedy(batch: RobotBatch, model: SwimmerModel, outside: list[Limit]) -> str:
     """Where only a thin film keeps a model from an answer: the least gap that it resolves, and what else helps."""
-    if not model.placed or quickest(model, batch).form == "table":
+    if not model.placed or model.form == "table":
         return ""
     least = least_gap(batch, model)
     if not np.isfinite(least):
@@ -343,7 +343,7 @@ def table_for(batch: RobotBatch, *, progress: Progress | None = None) -> TubeTab
 def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeometry, float]]:
     """Return what decides the tables that robots of a batch lack in their tubes, each once."""
     fits = all_hold(requirements(batch, TabledTube({})))
-    every = [(RobotGeometry.of(batch, index), tube_radius(batch, index)) for index in np.flatnonzero(fits).tolist()]
+    every = [in_tube(batch, index) for index in np.flatnonzero(fits).tolist()]
     return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and not _why_no_table(*one)]
 
 
@@ -358,18 +358,18 @@ def _why_no_table(geometry: RobotGeometry, radius: float) -> str:
 
 def why_no_table(batch: RobotBatch) -> str:
     """Why the first robot of a batch can have no table in its tube; empty where it can."""
-    return _why_no_table(RobotGeometry.of(batch), tube_radius(batch))
+    return _why_no_table(*in_tube(batch))
 
 
 def preparation_time(batch: RobotBatch, stage: StageName) -> str:
     """Return about how long the table of the first robot of a batch takes with two processes, in words."""
-    return Places(RobotGeometry.of(batch), tube_radius(batch), STAGES[stage]).time_to_solve()
+    return Places(*in_tube(batch), STAGES[stage]).time_to_solve()
 
 
 def _table_request(batch: RobotBatch) -> tuple[RobotGeometry, float]:
     """What decides the table of the first robot of a batch."""
-    radius = tube_radius(batch)
+    geometry, radius = in_tube(batch)
     if not np.isfinite(radius):
         raise InputError("there is no [channel]; allowed: a channel.diameter, for a table holds in its tube")
     check_usual_resolution(batch.options)
-    return RobotGeometry.of(batch), radius
+    return geometry, radius

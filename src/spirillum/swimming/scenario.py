@@ -172,10 +172,7 @@ class Scenario:
         return [self.swim(self.batch, other) for other in self.model.checked_by(self.batch)]
 
     def error_estimate(self, result: Swimming, checks: Sequence[Swimming]) -> float:
-        """Relative error of the forward velocity: the sum of what is known of it, see `SwimmerModel.checked_by`.
-
-        NaN for a model in closed form, and where inertia rules.
-        """
+        """Relative error of the forward velocity, see `SwimmerModel.checked_by`; NaN in closed form or with inertia."""
         found = self.model.stated_speed_error(self.batch)
         if checks:
             speeds = [one.forward_velocity for one in (result, *checks)]

@@ -63,14 +63,11 @@ def axis_height(batch: RobotBatch) -> PerRobot:
 
 
 def brennen_winet(batch: RobotBatch) -> LocalCoefficients:
-    """Coefficients near a plane floor, a << h << L: log(2 h/a) in place of the wavelength's logarithm.
-
-    Along the wire 2 pi mu/log(2h/a); across it, parallel to the floor 4 pi mu/log(2h/a) and normal to it
-    4 pi mu/(log(2h/a) - 1) (Brennen and Winet, Annu. Rev. Fluid Mech. 9:339, 1977; Katz, Blake and
-    Paveri-Fontana, J. Fluid Mech. 72:529, 1975). They are the thin limits of a cylinder's exact drag near
-    a plane (Jeffrey and Onishi, Q. J. Mech. Appl. Math. 34:129, 1981). h is the axis's height for all of
-    the wire.
-    """
+    """Coefficients near a plane floor, a << h << L: log(2 h/a) in place of the wavelength's logarithm."""
+    # Along the wire 2 pi mu/log(2h/a); across it, parallel to the floor 4 pi mu/log(2h/a) and normal to it
+    # 4 pi mu/(log(2h/a) - 1) (Brennen and Winet, Annu. Rev. Fluid Mech. 9:339, 1977; Katz, Blake and
+    # Paveri-Fontana, J. Fluid Mech. 72:529, 1975). They are the thin limits of a cylinder's exact drag near
+    # a plane (Jeffrey and Onishi, Q. J. Mech. Appl. Math. 34:129, 1981). h is the axis's height for all of the wire.
     log = np.log(4.0 * axis_height(batch) / batch.wire_diameter)
     mu = batch.viscosity
     return LocalCoefficients(2.0 * np.pi * mu / log, 4.0 * np.pi * mu / log, 4.0 * np.pi * mu / (log - 1.0))

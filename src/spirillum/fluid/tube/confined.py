@@ -174,13 +174,11 @@ def _reduced(solids: Solids, sources: Sources) -> Reduced:
 
 
 def _near_wall(wire: Wire, pose: TubePose) -> Samples:
-    """Correction of a line of forces for the finite thickness of a wire at a wall, (3 n, 3 n), robot axes.
-
-    A straight line at a height h over a plane has mobilities per length 4 log(2 h/a), 2 log(2 h/a) and
-    2 log(2 h/a) - 2 along itself, sideways and towards the plane, without the factor 1/(8 pi mu); a cylinder has
-    arccosh(h/a) in place of the logarithm, and 2 sqrt(1 - (a/h)^2) in place of 2 (Jeffrey and Onishi, 1981). The
-    difference is spread over a length h of the wire, for shorter waves of force do not feel the wall.
-    """
+    """Correction of a line of forces for the finite thickness of a wire at a wall, (3 n, 3 n), robot axes."""
+    # A straight line at a height h over a plane has mobilities per length 4 log(2 h/a), 2 log(2 h/a) and
+    # 2 log(2 h/a) - 2 along itself, sideways and towards the plane, without the factor 1/(8 pi mu); a cylinder has
+    # arccosh(h/a) in place of the logarithm, and 2 sqrt(1 - (a/h)^2) in place of 2 (Jeffrey and Onishi, 1981). The
+    # difference is spread over a length h of the wire, for shorter waves of force do not feel the wall.
     placed, tangents = pose.placed(wire.points), wire.tangents @ pose.rotation.T
     rho = np.hypot(placed[:, 1], placed[:, 2])
     height = pose.radius - rho

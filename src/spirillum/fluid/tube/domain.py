@@ -22,15 +22,20 @@ _TIGHTEST = 1.05  # Diameter of the tightest tube over the body's.
 _WIDEST = 1e3  # Largest size of a channel, m: those without one are infinite.
 
 
+def in_tube(batch: RobotBatch, index: int = 0) -> tuple[RobotGeometry, float]:
+    """Geometry of robot number `index` and R of its tube, m: what decides its table."""
+    return RobotGeometry.of(batch, index), 0.5 * number_of(batch.channel_diameter, index)
+
+
+def seated(batch: RobotBatch, index: int = 0) -> tuple[RobotGeometry, TubePose]:
+    """Geometry of robot number `index` and its pose in its tube; by default level, at a gap of `GAP_SHARE`."""
+    g, radius = in_tube(batch, index)
+    return g, TubePose.of(batch.pose, g.body, g.width, radius)
+
+
 def pose_of(batch: RobotBatch, index: int = 0) -> TubePose:
-    """Pose of robot number `index`; by default level, at a gap of `GAP_SHARE`."""
-    g = RobotGeometry.of(batch, index)
-    return TubePose.of(batch.pose, g.body, g.width, tube_radius(batch, index))
-
-
-def tube_radius(batch: RobotBatch, index: int = 0) -> float:
-    """R of the tube of robot number `index`, m."""
-    return 0.5 * number_of(batch.channel_diameter, index)
+    """Pose of robot number `index` in its tube."""
+    return seated(batch, index)[1]
 
 
 @lru_cache(maxsize=4096)
@@ -44,11 +49,11 @@ def _tail_clearance(g: RobotGeometry, pose: TubePose) -> tuple[float, str]:
 
 def placement_answer(batch: RobotBatch) -> dict[str, Any]:
     """Pose of the first robot of a batch, for results."""
-    pose = pose_of(batch)
-    room = pose.radius - 0.5 * RobotGeometry.of(batch).width
+    g, pose = seated(batch)
+    room = pose.radius - 0.5 * g.width
     found: dict[str, Any] = {
         "kind": "in the channel",
-        "gap": quantity(pose.clearance(RobotGeometry.of(batch).body), "m"),
+        "gap": quantity(pose.clearance(g.body), "m"),
         "eccentricity": quantity(pose.offset / room, "1"),
         "pitch": quantity(pose.pitch, "rad"),
         "ends": batch.placement.ends_of(number_of(batch.channel_length, 0)),
@@ -81,11 +86,9 @@ def pose_limits(
     thinnest_gap: float = _THINNEST_GAP,
     wire_film: float = WIRE_FILM,
 ) -> list[Limit]:
-    """Requirements on the pose in the tube for one of `PIECES`, after those that do not depend on it.
-
-    No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine for
-    the memory. The least gap is over the body's diameter, the least film at the wire over the wire's radius.
-    """
+    """Requirements on the pose in the tube for one of `PIECES`, after those that do not depend on it."""
+    # No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine
+    # for the memory. The least gap is over the body's diameter, the least film at the wire over the wire's radius.
     resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
     angles = {"pitch": batch.placement.pitch, "yaw": batch.placement.yaw}
@@ -113,7 +116,7 @@ def _films(batch: RobotBatch, part: str, kept: Sequence[Limit], thinnest_gap: fl
     asked, largest, coupling, tail = (np.full(batch.size, np.inf) for _ in range(4))
     where = ""
     for index in within(batch, kept):
-        g, radius = RobotGeometry.of(batch, index), tube_radius(batch, index)
+        g, radius = in_tube(batch, index)
         if not np.isfinite(radius):
             continue
         outlines = g.outlines
@@ -121,7 +124,7 @@ def _films(batch: RobotBatch, part: str, kept: Sequence[Limit], thinnest_gap: fl
         largest[index] = largest_gap(g.body, radius, batch.placement.pitch or 0.0, batch.placement.yaw)
         if not thinnest_gap * g.body_diameter <= asked[index] <= largest[index]:
             continue
-        pose = pose_of(batch, index)
+        pose = TubePose.of(batch.pose, g.body, g.width, radius)
         if "coupling" in outlines and "coupling" in PIECES[part]:
             coupling[index] = pose.clearance(outlines["coupling"])
         if "tail" in PIECES[part]:

@@ -21,7 +21,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
-from spirillum.fluid.tube.domain import pose_limits, pose_of, tube_radius
+from spirillum.fluid.tube.domain import in_tube, pose_limits, pose_of, seated
 from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import BELOW, TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
@@ -140,10 +140,8 @@ def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
 
 
 def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: Samples) -> Samples:
-    """Resistance along the tube at poses, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4).
-
-    Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
-    """
+    """Resistance along the tube at poses, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4)."""
+    # Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
     found = np.empty((gap.size, MOTIONS, MOTIONS))
     which = np.broadcast_to(np.arange(len(tables)), gap.shape)
     mean_resistances(tables, which.ravel(), gap.ravel(), pitch.ravel(), yaw.ravel(), PHASES, found)
@@ -160,13 +158,14 @@ class TabledTube(Tube):
         """Evaluate from tables."""
         super().__init__()
         self._tables = tables
+        self._asked: tuple[RobotBatch, list[Limit]] | None = None
         self._known: tuple[RobotBatch, tuple[Samples, Samples]] | None = None
         coarsest = min(tables.values(), key=lambda table: list(STAGES).index(table.stage), default=None)
         self.error_against = None if coarsest is None else coarsest.error_against
 
     def table_of(self, batch: RobotBatch, index: int = 0) -> TubeTable:
         """The table of one robot."""
-        return self._tables[_key(batch, index)]
+        return self._tables[key_of(*in_tube(batch, index))]
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """None: the error of a table is stored, see `stated_speed_error`."""
@@ -191,6 +190,13 @@ class TabledTube(Tube):
             Limit.named("checked-yaw", yaws, most),
         ]
 
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """Asked for before the resistance, which takes it again: that of the last batch is kept."""
+        asked = self._asked
+        if asked is None or asked[0] is not batch:
+            self._asked = asked = batch, super().domain(batch)
+        return asked[1]
+
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
         unbounded = Slender().part_domain(batch, part)
@@ -205,9 +211,10 @@ class TabledTube(Tube):
 
     def _evaluated(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)
-        for index in within(batch, self.part_domain(batch, "robot")):
-            pose, mean = pose_of(batch, index), np.empty((MOTIONS, MOTIONS))
-            mean_resistance_at(self.table_of(batch, index).packed, pose.offset, pose.pitch, pose.yaw, PHASES, mean)
+        for index in within(batch, self.domain(batch)):
+            (geometry, pose), mean = seated(batch, index), np.empty((MOTIONS, MOTIONS))
+            table = self._tables[key_of(geometry, pose.radius)]
+            mean_resistance_at(table.packed, pose.offset, pose.pitch, pose.yaw, PHASES, mean)
             axes = along_the_tube(np.array(pose.pitch), np.array(pose.yaw))
             found[index] = 0.0
             found[index][np.ix_(_HELD, _HELD)] = number_of(batch.viscosity, index) * axes.T @ mean @ axes
@@ -216,11 +223,8 @@ class TabledTube(Tube):
 
 def tables_of(batch: RobotBatch) -> list[TubeTable | None]:
     """The table of each robot of a batch; None where it has none, or no tube."""
-    radii = [tube_radius(batch, index) for index in range(batch.size)]
-    return [
-        find_table(RobotGeometry.of(batch, index), radius) if np.isfinite(radius) else None
-        for index, radius in enumerate(radii)
-    ]
+    placed = (in_tube(batch, index) for index in range(batch.size))
+    return [find_table(geometry, radius) if np.isfinite(radius) else None for geometry, radius in placed]
 
 
 def tabled(batch: RobotBatch) -> TabledTube | None:
@@ -231,12 +235,8 @@ def tabled(batch: RobotBatch) -> TabledTube | None:
     for index, table in enumerate(tables_of(batch)):
         if table is None:
             return None
-        pose = pose_of(batch, index)
+        geometry, pose = seated(batch, index)
         if np.isfinite(pose.offset) and table.at(pose.offset, pose.pitch, pose.yaw)[1] != INSIDE:
             return None
-        found[_key(batch, index)] = table
+        found[key_of(geometry, pose.radius)] = table
     return TabledTube(found)
-
-
-def _key(batch: RobotBatch, index: int) -> str:
-    return key_of(RobotGeometry.of(batch, index), tube_radius(batch, index))

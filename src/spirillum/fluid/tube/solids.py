@@ -75,16 +75,13 @@ class Solids:
     """Solids of revolution and the wall."""
 
     def __init__(
-        self, solids: Sequence[tuple[Outline, int]], pose: TubePose, fineness: Fineness, lines: Samples | None = None
+        self,
+        solids: Sequence[tuple[Outline, int]],  # outlines, and the part (0 body, 1 rotor) with which each moves
+        pose: TubePose,
+        fineness: Fineness,
+        lines: Samples | None = None,  # points of wires (x, rho, blob radius) that come close, (n, 3), m
     ) -> None:
-        """Cut into panels and count modes, without solving.
-
-        Args:
-            solids: outlines, and the part (0 body, 1 rotor) with which each moves; none for wires alone.
-            pose: where in the tube they are.
-            fineness: how finely.
-            lines: points of wires (x, rho, blob radius) that come close, (n, 3), m.
-        """
+        """Cut into panels and count modes, without solving."""
         self.pose, self.fineness = pose, fineness
         self.parts = np.array([part for _, part in solids])
         self.kept: dict[str, object] = {}  # what others derive from the factors and want to use again

@@ -200,14 +200,7 @@ class TubeTable:
         return key_of(self.geometry, self.radius)
 
     def at(self, offset: float, pitch: float = 0.0, yaw: float = 0.0, phase: float = 0.0) -> tuple[Samples, int]:
-        """The 8x8 at a pose, viscosity 1, and how it leaves the table's range, see `resistance_at`.
-
-        Args:
-            offset: e of the body's mid-length from the tube's axis, m.
-            pitch: nose up, rad.
-            yaw: nose to the side, rad.
-            phase: of the tail, rad.
-        """
+        """The 8x8 at a pose (m, rad), viscosity 1, and how it leaves the table's range, see `resistance_at`."""
         out = np.empty((core.MOTIONS, core.MOTIONS))
         left = core.resistance_at(self.packed, offset, pitch, yaw, phase, out)
         return out, int(left)

@@ -197,11 +197,9 @@ class TiltedRings(Rings):
         away: float,
         precision: type[np.floating] = np.float64,
     ) -> list[Samples]:
-        """Waves of one k on the unknowns of a tier, for each system, (orders, parities, 2, 3, unknowns).
-
-        The 2 stands for the real and the imaginary part; parities of waves are those of the system's families. Steep
-        waves are damped but where a ring nears the wall: they are evaluated on that arc only.
-        """
+        """Waves of one k on the unknowns of a tier, for each system, (orders, parities, 2, 3, unknowns)."""
+        # The 2 stands for the real and the imaginary part; parities of waves are those of the system's families. Steep
+        # waves are damped but where a ring nears the wall: they are evaluated on that arc only.
         symmetric = bool(self.pose.yaw == 0)
         theta = midpoints(orders, tier.modes, whole=not symmetric)
         onto = _onto_modes(theta, tier.modes, precision, symmetric=symmetric)
@@ -243,13 +241,10 @@ class TiltedRings(Rings):
         high: int,
         precision: type[np.floating],
     ) -> Samples:
-        """Waves of one k and some orders on arcs of rings.
-
-        Over even, odd; component; ring; order; real, imaginary; wall component; angle. `placed`: points on the arcs
-        about the tube's axis, (rings, angles, 3), m.
-        """
+        """Waves of one k and some orders on arcs of rings, at points about the tube's axis, (rings, angles, 3), m."""
         from spirillum.kernels.core import ring_waves, single_ring_waves
 
+        # Over even, odd; component; ring; order; real, imaginary; wall component; angle.
         out = np.empty((2, 3, len(placed), high - low, 2, 3, theta.size), precision)
         fill = ring_waves if precision is np.float64 else single_ring_waves
         fill(float(waves.k[number]), waves.radius, placed, theta, self.pose.rotation, low, out)

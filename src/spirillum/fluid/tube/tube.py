@@ -28,7 +28,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import CHECKED, STATED, fit_clause, validation_note
 from spirillum.fluid.tube.cache import cached_or_computed, is_cached
 from spirillum.fluid.tube.confined import UnitMotions, share_basis, solve_unit_motions
-from spirillum.fluid.tube.domain import placement_answer, pose_limits, pose_of
+from spirillum.fluid.tube.domain import placement_answer, pose_limits, seated
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
 from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
@@ -169,7 +169,8 @@ def check_solvable(geometry: RobotGeometry, pose: TubePose, fineness: Fineness) 
 def unit_motions(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> UnitMotions:
     """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux."""
     fineness = Tube().fineness(batch, index)
-    return _unit_motions(_SolveRequest(RobotGeometry.of(batch, index), "robot", pose_of(batch, index), fineness, phase))
+    g, pose = seated(batch, index)
+    return _unit_motions(_SolveRequest(g, "robot", pose, fineness, phase))
 
 
 def finest_wire(g: RobotGeometry) -> Accuracy:
@@ -246,7 +247,7 @@ class Tube(SwimmerModel):
         limits = pose_limits(batch, part, Slender().part_domain(batch, part))
         unknowns, waves, memory = np.zeros((3, batch.size))
         for index in within(batch, limits):
-            g, pose = RobotGeometry.of(batch, index), pose_of(batch, index)
+            g, pose = seated(batch, index)
             key = _solid_key(g, part, pose, self.fineness(batch, index))
             unknowns[index], waves[index] = _size(key)
             if unknowns[index] <= _MOST_UNKNOWNS and waves[index] <= _MOST_WAVES:
@@ -320,7 +321,7 @@ class Tube(SwimmerModel):
         found = np.full((batch.size, MOTIONS, MOTIONS), np.nan)
         turns = np.broadcast_to(phase, (batch.size,))
         for index in within(batch, self.part_domain(batch, part)):
-            g, pose = RobotGeometry.of(batch, index), pose_of(batch, index)
+            g, pose = seated(batch, index)
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
             question = _SolveRequest(g, part, pose, self.fineness(batch, index), turn)
             found[index] = number_of(batch.viscosity, index) * _answer(question)

@@ -174,13 +174,11 @@ def _spin_torque(wire: Wire, part: int) -> Samples:
 
 
 def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple[Samples, Samples, Samples]:
-    """First moments that cross-sections bear, (n, 5, 3, 3), their velocities at the stations, and their gradients.
-
-    Force by displacement: spin about the tangent, tangential forces displaced along each of two normals, and two
-    strains of the cross-section; trace-free, of unit norm, orthogonal. On an infinite cylinder a unit density of each
-    moves the gradient along it by 4, 4, 4, 2, 2 over 8 pi mu a^2; the kernel's own answer on an infinite straight line
-    is 2 (a/e)^2 of that, and what is missing is added to each station's own entry.
-    """
+    """First moments that cross-sections bear, (n, 5, 3, 3), their velocities at the stations, and their gradients."""
+    # Force by displacement: spin about the tangent, tangential forces displaced along each of two normals, and two
+    # strains of the cross-section; trace-free, of unit norm, orthogonal. On an infinite cylinder a unit density of each
+    # moves the gradient along it by 4, 4, 4, 2, 2 over 8 pi mu a^2; the kernel's own answer on an infinite straight
+    # line is 2 (a/e)^2 of that, and what is missing is added to each station's own entry.
     from spirillum.kernels.core import moment_matrices
 
     tangents = np.concatenate([wire.tangents for wire in wires])
