@@ -18,13 +18,13 @@ from flat_pictures import PAINTS, Flat
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.robot.robot import Robot, robot_text
+from spirillum.robot.surface import linear_light
 from spirillum.units import Hz
 from spirillum.virtual.artifacts import Degradation, Troubles, stripe_edges
 from spirillum.virtual.disturbances import Disturbances
 from spirillum.virtual.motion import motion_of
 from spirillum.virtual.optics import framed, lens_of, swimming_range, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
-from spirillum.virtual.solids import linear
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.truth import setup_text
 
@@ -223,7 +223,7 @@ def _virtual(truth: Drawn, variant: str) -> Scene:
 
 def _all_of_one(colours: np.ndarray, paint: str) -> np.ndarray:
     """Colours of the body's triangles, white stripes painted over."""
-    white, instead = (linear(np.array(STRIPE_COLOURS[name])) for name in ("white", paint))
+    white, instead = (linear_light(np.array(STRIPE_COLOURS[name])) for name in ("white", paint))
     return np.where(np.isclose(colours, white).all(axis=1)[:, None], instead, colours)
 
 

@@ -114,7 +114,7 @@ def test_the_planted_spread_has_its_size() -> None:
 
     steady = {"forward_velocity": 1e-3, "tail_rotation_rate": 7.0, "body_rotation_rate": -0.5}
     plan = _Plan.of({"trials": 400, "spread": 0.02})
-    plans = _planned("w", load("biorob2012-wide"), steady, plan, CameraOptions(), 0)
+    plans = _planned((0, "w"), load("biorob2012-wide"), None, steady, plan, CameraOptions())
     factors = np.array([plan.rates["tail_rotation_rate"] for plan in plans]) / 7.0
     assert factors.std() == pytest.approx(0.02, rel=0.1)
     assert factors.mean() == pytest.approx(1.0, abs=0.003)

@@ -38,7 +38,7 @@ from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.surface import corner_normals
+from spirillum.robot.surface import corner_normals, linear_light
 from spirillum.swimming.preparation import AUTO
 from spirillum.units import KINDS, parse_option
 
@@ -73,7 +73,7 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
                 continue
             corners = np.concatenate([piece.vertices[piece.faces[chosen]], normals[chosen]], axis=-1).reshape(-1, 6)
             unique, faces = np.unique(corners.astype(np.float32), axis=0, return_inverse=True)
-            colour = _linear(piece.colours[chosen][0])
+            colour = linear_light(piece.colours[chosen][0])
             material = PBRMaterial(
                 name=region,
                 baseColorFactor=[*np.round(255.0 * colour).astype(np.uint8), 255],
@@ -95,11 +95,6 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
             file_type="glb", include_normals=True, tree_postprocessor=lambda tree: tree["asset"].update(generator=MARK)
         )
     )
-
-
-def _linear(colour: np.ndarray) -> np.ndarray:
-    """Linear light from sRGB, both 0 to 1 (IEC 61966-2-1)."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
 
 
 KINDS_OF_FILES = {

@@ -16,7 +16,7 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.mesh import COLOURS, RobotMesh, robot_mesh
 from spirillum.robot.outline import Arc, Segment
 from spirillum.robot.robot import Robot
-from spirillum.robot.surface import corner_normals
+from spirillum.robot.surface import corner_normals, linear_light
 from spirillum.swimming.preparation import WALLED
 from spirillum.units import display_unit, shown_in
 
@@ -69,7 +69,7 @@ def _packed(pieces: list[RobotMesh]) -> dict[str, Any]:
     for piece in pieces:
         normals = corner_normals(piece.vertices, piece.faces, float(_CREASE)).reshape(-1, 3)
         metal = np.full((len(normals), 1), float(piece.name in _METALS and COLOURS[piece.name] != COLOURS["body"]))
-        colours = _linear(np.repeat(piece.colours, 3, axis=0))
+        colours = linear_light(np.repeat(piece.colours, 3, axis=0))
         corners.append(np.concatenate([piece.vertices[piece.faces].reshape(-1, 3), normals, colours, metal], axis=1))
     if not corners:
         corners = [np.zeros((0, 10))]
@@ -78,11 +78,6 @@ def _packed(pieces: list[RobotMesh]) -> dict[str, Any]:
         "vertices": base64.b64encode(np.ascontiguousarray(unique, dtype="<f4").tobytes()).decode(),
         "triangles": base64.b64encode(index.ravel().astype("<u4").tobytes()).decode(),
     }
-
-
-def _linear(colour: Samples) -> Samples:
-    """SRGB to linear light (IEC 61966-2-1)."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
 
 
 _ROWS = rows_of("pages/quantities.csv")

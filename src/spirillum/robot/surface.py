@@ -206,3 +206,9 @@ def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
 def _unit_or_zero(vectors: Samples) -> Samples:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)
+
+
+def linear_light(colours: Samples) -> Samples:
+    """Linear light of sRGB colours, both 0 to 1 (IEC 61966-2-1)."""
+    colours = np.asarray(colours, dtype=float)
+    return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)

@@ -285,13 +285,6 @@ def _cables(count: int, seed: int, size: tuple[int, int]) -> Samples:
         start, lean, sway, phase = rng.uniform([0.1, -0.2, 0.02, 0.0], [0.9, 0.2, 0.05, 2.0 * np.pi])
         across = columns * (start + sway * np.sin(2.0 * np.pi * along + phase)) + lean * rows * (along - 0.5)
         path = np.rint(16.0 * np.column_stack([across, rows * along])).astype(np.int32)
-        cv2.polylines(
-            cover,
-            [path],
-            isClosed=False,
-            color=255,
-            thickness=max(2, round(_CABLE * columns)),
-            lineType=cv2.LINE_AA,
-            shift=4,
-        )
+        thickness = max(2, round(_CABLE * columns))
+        cv2.polylines(cover, [path], isClosed=False, color=255, thickness=thickness, lineType=cv2.LINE_AA, shift=4)
     return (cover / 255.0)[..., None]

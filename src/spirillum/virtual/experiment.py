@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -32,6 +33,7 @@ from spirillum.files import (
 )
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
+from spirillum.quantities import in_units
 from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
@@ -46,7 +48,7 @@ from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.optics import swimming_range
 from spirillum.virtual.trial import render
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, TrialOptions
-from spirillum.virtual.truth import SYNTHETIC, rate_quantities
+from spirillum.virtual.truth import SYNTHETIC
 
 _LONGEST = 20.0
 _MOST = 10_000
@@ -108,7 +110,7 @@ class VirtualExperiment(DisplayMixin):
         for name in self.robots:
             known = zip(("model", "model_reason"), self.models.get(name, ("", "")), strict=True)
             answered = {key: text for key, text in known if text}  # without a reason where the model was named
-            robots.append({"robot": name, **answered, **rate_quantities(self.rates[name])})
+            robots.append({"robot": name, **answered, **in_units(self.rates[name])})
         content = {
             "synthetic": True,
             "folder": str(self.folder),
@@ -190,8 +192,8 @@ def virtual_experiment(
     }
     planned = [
         item
-        for index, name in enumerate(robots)
-        for item in _planned(name, robots[name], steady[name], plan, camera, index, _gap(robots[name], placement))
+        for index, (name, robot) in enumerate(robots.items())
+        for item in _planned((index, name), robot, placement, steady[name], plan, camera)
     ]
     claim = {"mark": _MARK, "content": mark, "what": "virtual experiment"}
     inputs = study if isinstance(study, (str, Path)) else None
@@ -199,7 +201,7 @@ def virtual_experiment(
         missing = [item for item in planned if not _finished(folder, item)]
         for name in robots:
             output_folder(folder / name, folder)
-        render_one = _renderer(folder, camera, degradation)
+        render_one = partial(_render_one, folder, camera, degradation)
         _render_all(render_one, missing, len(planned), plan.jobs, progress)
         table = folder / _TABLE
         write_text(table, _table(planned))
@@ -245,23 +247,18 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
     return _Filmed(found, loaded.study.models[0], placement)
 
 
-def _gap(robot: Robot, placement: Placement | None) -> float | None:
-    """Displayed gap of a robot, m; None for that of the reference pose."""
-    if placement is None or robot.channel is None:
-        return None
-    return gap_of(placement, robot.body.diameter, 0.5 * robot.channel.diameter)
-
-
 def _planned(
-    name: str,
+    numbered: tuple[int, str],
     robot: Robot,
+    placement: Placement | None,
     steady: Mapping[str, float],
     plan: _Plan,
     camera: CameraOptions,
-    index: int,
-    gap: float | None = None,
 ) -> list[Planned]:
-    planned = []
+    """The trials of one robot, which has its number and the name of its folder."""
+    (index, name), gap, planned = numbered, None, []
+    if placement is not None and robot.channel is not None:  # else it is shown at the reference pose
+        gap = gap_of(placement, robot.body.diameter, 0.5 * robot.channel.diameter)
     low, high = swimming_range(robot, camera)
     for number in range(1, plan.trials + 1):
         rng = np.random.default_rng([plan.seed, index, number])
@@ -321,42 +318,44 @@ class _Stopped(Exception):  # noqa: N818
     """Rendering was interrupted."""
 
 
-_Render = Callable[[Planned, threading.Event], None]
+def _render_one(
+    folder: Path, camera: CameraOptions, degradation: Degradation, planned: Planned, stop: threading.Event
+) -> None:
+    """Render one trial into a folder, until an event stops it."""
+
+    def check_stop(_what: str, _done: int, _total: int) -> None:
+        if stop.is_set():
+            raise _Stopped
+
+    trial = folder / planned.label
+    beside = [trial.with_name(f"{trial.name}.{end}") for end in ("mp4", "truth.json", "truth.nc")]
+    for damaged in (*beside, trial.parent / "setup.toml", trial.parent / "robot.toml"):
+        if damaged.is_file() and not written_by_us(damaged):  # the folder is claimed: it was ours
+            damaged.unlink()
+    render(
+        planned.robot,
+        beside[0],
+        motion={
+            "forward_velocity": planned.rates["forward_velocity"],
+            "tail_rate": planned.rates["tail_rotation_rate"],
+            "body_rate": planned.rates["body_rotation_rate"],
+        },
+        trial=planned.trial,
+        camera=camera,
+        degradation=degradation,
+        setup=trial.parent / "setup.toml",
+        seed=planned.seed,
+        progress=check_stop,
+    )
 
 
-def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> _Render:
-    """A function that renders one trial into a folder, until an event stops it."""
-
-    def render_one(planned: Planned, stop: threading.Event) -> None:
-        def check_stop(_what: str, _done: int, _total: int) -> None:
-            if stop.is_set():
-                raise _Stopped
-
-        trial = folder / planned.label
-        beside = [trial.with_name(f"{trial.name}.{end}") for end in ("mp4", "truth.json", "truth.nc")]
-        for damaged in (*beside, trial.parent / "setup.toml", trial.parent / "robot.toml"):
-            if damaged.is_file() and not written_by_us(damaged):  # the folder is claimed: it was ours
-                damaged.unlink()
-        render(
-            planned.robot,
-            folder / f"{planned.label}.mp4",
-            motion={
-                "forward_velocity": planned.rates["forward_velocity"],
-                "tail_rate": planned.rates["tail_rotation_rate"],
-                "body_rate": planned.rates["body_rotation_rate"],
-            },
-            trial=planned.trial,
-            camera=camera,
-            degradation=degradation,
-            setup=folder / planned.folder / "setup.toml",
-            seed=planned.seed,
-            progress=check_stop,
-        )
-
-    return render_one
-
-
-def _render_all(render_one: _Render, missing: list[Planned], total: int, jobs: int, progress: Progress | None) -> None:
+def _render_all(
+    render_one: Callable[[Planned, threading.Event], None],
+    missing: list[Planned],
+    total: int,
+    jobs: int,
+    progress: Progress | None,
+) -> None:
     """Render what is missing; after an interruption, finished trials stay and no unfinished one is left."""
     stop = threading.Event()
     done = total - len(missing)

@@ -17,7 +17,7 @@ from spirillum.errors import InputError
 from spirillum.kernels.core import project, sightlines, still_picture
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
-from spirillum.virtual.solids import linear
+from spirillum.robot.surface import linear_light
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
 
@@ -87,11 +87,8 @@ _SIDE_AXIS = 30e-3  # height of the tube's axis above the far wall in the view f
 _GLASS = 2.0e-3  # thickness of the tube's wall, m; assumed
 _LINE_WIDTH, _LINE_LENGTH, _RULER_DISTANCE, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
 _OIL = (0.72, 0.90, 1.98)  # absorption coefficients of red, green and blue in the oil, 1/m: a faint tint, assumed
-_GLASS_ABSORPTION = 38.0
-"""Absorption coefficient of the glass, 1/m; assumed.
-
-Glass refracts nearly as oil does: lines of sight go straight through it.
-"""
+_GLASS_ABSORPTION = 38.0  # of the glass, 1/m; assumed
+# Glass refracts nearly as oil does: lines of sight go straight through it.
 _MOTTLE = (9.0, 14.0, 23.0, 37.0, 61.0, 90.0)  # wavenumbers of the floor's fine structure, 1/m; assumed
 _SHEET = (0.90, 0.90, 0.88)
 _FINE_LINES, _STRONG_LINES = (0.11, (0.47, 0.60, 0.84)), (0.16, (0.17, 0.18, 0.23))
@@ -179,7 +176,7 @@ def backdrop(tank: Tank, lens: VirtualLens) -> Backdrop:
     ground = (0.80, 0.81, 0.79) if tank.view == "top" else (0.74, 0.79, 0.83)
     if tank.grid:
         ground = _SHEET
-    colours = linear(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))  # ground, paper, ink
+    colours = linear_light(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))  # ground, paper, ink
     end, paper = tank.ruler + _LINE_LENGTH * tank.shrunk, _PAPER * tank.shrunk
     line_width = min(_LINE_WIDTH, 0.25 * tank.spacing)
     start = math.inf if tank.grid else tank.ruler - paper
@@ -206,7 +203,7 @@ def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
             pixel = np.abs(np.gradient(positions, axis=1 - axis))
             bare *= 1.0 - _line_share(positions, pixel, apart * spacing, width * spacing)
         ratio *= bare[..., None]
-        ratio += (1.0 - bare[..., None]) * (linear(np.array(colour)) / paper)
+        ratio += (1.0 - bare[..., None]) * (linear_light(np.array(colour)) / paper)
     shine = still.shine[..., None]
     still.light[:] = (still.light - shine) * ratio + shine
 
@@ -231,13 +228,8 @@ _LOOKS = 1001  # times at which the visibility of the robot is checked
 
 def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> VirtualLens:
     """The lens of a camera."""
-    return replace(_ideal_lens(camera), tilt=tilt, distortion=(camera.distortion, 0.0))
-
-
-def _ideal_lens(camera: CameraOptions) -> VirtualLens:
-    """The lens without tilt and distortion."""
-    focal = _FOCAL * camera.size[0] / camera.shrunk
-    return VirtualLens(_EYE, _SURFACE, _INDEX, focal, camera.size, leftwards=camera.leftwards)
+    focal, distortion = _FOCAL * camera.size[0] / camera.shrunk, (camera.distortion, 0.0)
+    return VirtualLens(_EYE, _SURFACE, _INDEX, focal, camera.size, camera.leftwards, tilt, distortion)
 
 
 def check_size(robot: Robot, tank: Tank, lens: VirtualLens) -> None:
@@ -258,7 +250,8 @@ def check_size(robot: Robot, tank: Tank, lens: VirtualLens) -> None:
 
 def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
     """Smallest and largest x of the body's mid-length at which the whole robot is in the picture, m."""
-    low, high = _visible(_ideal_lens(camera), tube_height(robot, camera.view))
+    ideal = replace(lens_of(camera, (0.0, 0.0)), distortion=(0.0, 0.0))
+    low, high = _visible(ideal, tube_height(robot, camera.view))
     rear, nose = _extent(robot)
     return low - rear, high - nose
 

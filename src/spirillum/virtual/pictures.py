@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -282,21 +283,18 @@ _STEPS = 1 << 14
 _BRIGHTNESS = 1.05  # exposure of the camera: linear light of white paper is about 0.8
 
 
+@dataclass
 class FrameEncoder:
     """The frames of one video, in order: noise differs from frame to frame."""
 
-    def __init__(
-        self,
-        painter: Painter,
-        disturbances: Disturbances,
-        trajectory: TrialTrajectory,
-        exposure: float,
-        view: ViewArtifacts | None = None,
-    ) -> None:
-        self._view = view
-        self._painter, self._disturbances, self._trajectory = painter, disturbances, trajectory
-        self._exposure = exposure
-        width, height = painter.lens.size
+    painter: Painter
+    disturbances: Disturbances
+    trajectory: TrialTrajectory
+    exposure: float  #: Of each frame, s.
+    view: ViewArtifacts | None = None
+
+    def __post_init__(self) -> None:
+        width, height = self.painter.lens.size
         v, u = np.meshgrid(np.linspace(-1, 1, height) * height, np.linspace(-1, 1, width) * width, indexing="ij")
         self._vignette = 1.0 - _VIGNETTING * (u**2 + v**2) / (width**2 + height**2)
         light = np.linspace(0.0, 1.0, _STEPS)
@@ -304,11 +302,11 @@ class FrameEncoder:
 
     def image(self, time: float) -> np.ndarray:
         """(height, width, 3) sRGB bytes of the frame at a time."""
-        disturbances = self._disturbances
-        light = self._painter.light(self._trajectory, time, self._exposure)
-        disturbances.disturb(light, time, self._trajectory.at(time).position)
-        if self._view is not None:
-            light = self._view.camera_picture(light, time)
+        disturbances = self.disturbances
+        light = self.painter.light(self.trajectory, time, self.exposure)
+        disturbances.disturb(light, time, self.trajectory.at(time).position)
+        if self.view is not None:
+            light = self.view.camera_picture(light, time)
         image = np.empty(light.shape, dtype=np.uint8)
         gain = _BRIGHTNESS * disturbances.gain(time)
         starts = disturbances.starts(light.shape[0])

@@ -16,20 +16,15 @@ from spirillum.kernels.core import shade
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
-from spirillum.robot.surface import Faces, corner_normals
+from spirillum.robot.surface import Faces, corner_normals, linear_light
 from spirillum.virtual.artifacts import repainted
 
 _BATTERY = (0.03, 0.58, 0.56, 0.30)
 """Start and end along the room before the seal; half the width and the height over the body's radius, as the bent light
 shows them; assumed."""
 _BOARD, _CHIP = (0.60, 0.64, 0.60, 0.60), (0.64, 0.69, 0.28, 0.17)
-_WRAP, _BACK, _GREEN, _BLACK, _GREY = (
-    (0.36, 0.43, 0.58),
-    (0.80, 0.80, 0.78),
-    (0.13, 0.40, 0.22),
-    (0.16, 0.16, 0.17),
-    (0.62, 0.62, 0.60),
-)
+_WRAP, _BACK = (0.36, 0.43, 0.58), (0.80, 0.80, 0.78)
+_GREEN, _BLACK, _GREY = (0.13, 0.40, 0.22), (0.16, 0.16, 0.17), (0.62, 0.62, 0.60)
 """sRGB of the battery's two faces, of the board, its chip and the seal's front wall; assumed."""
 
 
@@ -57,15 +52,8 @@ def covered_body(robot: Robot, body: RobotMesh) -> list[RobotMesh]:
 def part_of(piece: RobotMesh, chosen: np.ndarray) -> RobotMesh:
     """Some triangles of a piece."""
     used, faces = np.unique(piece.faces[chosen], return_inverse=True)
-    return RobotMesh(
-        piece.name,
-        piece.part,
-        piece.vertices[used],
-        faces.reshape(-1, 3),
-        piece.colours[chosen],
-        piece.regions,
-        piece.region[chosen],
-    )
+    own = {"colours": piece.colours[chosen], "region": piece.region[chosen]}
+    return replace(piece, vertices=piece.vertices[used], faces=faces.reshape(-1, 3), **own)
 
 
 def _box(along: tuple[float, float], half: Samples, colour: tuple[float, float, float], z: float = 0.0) -> RobotMesh:
@@ -95,12 +83,6 @@ MATERIALS: dict[str, tuple[float, float, float, float]] = {
 """Ambient, diffuse and specular reflectance, and exponent of the specular one, by piece; assumed."""
 _KINDS = tuple(MATERIALS)
 _METALS = frozenset(_KINDS) - {"body", "contents"}
-
-
-def linear(colours: Samples) -> Samples:
-    """Linear light of sRGB colours, 0 to 1 (IEC 61966-2-1)."""
-    colours = np.asarray(colours, dtype=float)
-    return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
 
 
 class Lamps(NamedTuple):
@@ -159,7 +141,7 @@ def joined(pieces: list[RobotMesh]) -> RenderedSolid:
     vertices, faces, colours, gloss, normals, kind, count = [], [], [], [], [], [], 0
     for piece in pieces:
         points, triangles, origin = _shortened(np.asarray(piece.vertices), np.asarray(piece.faces))
-        own = linear(piece.colours)[origin]
+        own = linear_light(piece.colours)[origin]
         vertices.append(points)
         faces.append(triangles + count)
         colours.append(own)

@@ -30,6 +30,7 @@ from spirillum.files import (
 from spirillum.formats.h264 import H264Writer, h264_writer
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
+from spirillum.quantities import in_units
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
@@ -51,7 +52,7 @@ from spirillum.virtual.optics import VirtualLens, check_size, framed, lens_of, o
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
-from spirillum.virtual.truth import SYNTHETIC, companion_paths, rate_quantities, setup_text, truth_dataset, truth_text
+from spirillum.virtual.truth import SYNTHETIC, companion_paths, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -154,7 +155,7 @@ class VirtualTrial(DisplayMixin):
             "video": str(self.path),
             "setup": str(self.setup),
             "truth": str(self.truth),
-            **rate_quantities(self.rates),
+            **in_units(self.rates),
             "frames": self.frames,
             "dropped": self.dropped,
             "width": self.size[0],
@@ -265,6 +266,7 @@ def render(
     robot_file = robot.name if is_preset(robot) else names["robot"].name
     height = _stated_height(float(trajectory.position[:, 2].mean()), setup_errors.depth_error, lens.surface)
     axis = height, setup_errors.depth_uncertainty
+    idle_seed = seed and degradation == Degradation(crf=degradation.crf) and not troubles.uses_seed
     written = VirtualTrial(
         path=target,
         setup=names["setup"],
@@ -284,7 +286,7 @@ def render(
             *shown.warnings,
             *_slowness(trajectory, robot),
             *out_of_picture(trajectory, robot, lens),
-            *_unused_seed_note(seed, degradation, troubles),
+            *([Note.named("idle-seed", seed=seed)] if idle_seed else []),
         ),
     )
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
@@ -325,14 +327,6 @@ def _slowness(trajectory: TrialTrajectory, robot: Robot) -> list[Note]:
     shown = show(way, display_unit(way, "m"))
     seconds = f"{trajectory.duration:.3g} s"
     return [Note.named("slow-video", way=shown, share=percent(way / length), seconds=seconds)]
-
-
-def _unused_seed_note(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:
-    """A sentence on a seed of a video that uses no random numbers; none without a seed."""
-    plain = Degradation(crf=degradation.crf)
-    if not seed or degradation != plain or troubles.uses_seed:
-        return []
-    return [Note.named("idle-seed", seed=seed)]
 
 
 def _stated_height(height: float, error: float, surface: float) -> float:

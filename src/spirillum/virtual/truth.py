@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.envelope import as_json, envelope, quantity
+from spirillum.envelope import as_json, envelope
 from spirillum.files import MARK
 from spirillum.formats.templates import rendered
-from spirillum.quantities import unit_of
+from spirillum.quantities import in_units
 from spirillum.virtual.optics import VirtualLens
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
@@ -51,14 +51,9 @@ def setup_text(
     )
 
 
-def rate_quantities(rates: Mapping[str, float]) -> dict[str, Any]:
-    """Forward velocity and rates as quantities of a result."""
-    return {name: quantity(value, unit_of(name)) for name, value in rates.items()}
-
-
 def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
     """The truth of a trial, JSON."""
-    return as_json(envelope("truth", {"synthetic": True, **rate_quantities(rates), **content}, (SYNTHETIC,))) + "\n"
+    return as_json(envelope("truth", {"synthetic": True, **in_units(rates), **content}, (SYNTHETIC,))) + "\n"
 
 
 def truth_dataset(
