@@ -14,7 +14,7 @@ from spirillum.notes import notes_of
 
 def quantity(value: float | Iterable[float] | None, unit: str, **more: Any) -> dict[str, Any]:
     """``{"value": ..., "unit": ...}`` in SI with rates in rad/s; what is not finite becomes null."""
-    return {"value": _finite(value), "unit": unit, **more}
+    return {"value": finite(value), "unit": unit, **more}
 
 
 def interval(low: float, high: float, level: float = 0.95) -> dict[str, Any]:
@@ -22,15 +22,14 @@ def interval(low: float, high: float, level: float = 0.95) -> dict[str, Any]:
     return {"low": low, "high": high, "kind": "interval", "level": level} if math.isfinite(low) else {}
 
 
-def _finite(value: Any) -> Any:
-    if value is None:
-        return None
+def finite(value: Any) -> Any:
+    """A number, or numbers in lists or arrays, with None for what is not finite."""
     if isinstance(value, (float, np.floating)):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, np.ndarray):
-        return _finite(value.tolist())
+        return finite(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return value
 
 

@@ -30,7 +30,6 @@ from spirillum.vision.camera.optics import BodyPose, positions_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
-from spirillum.vision.track.body import PoseFit
 from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.track.learning import InitialDetection
@@ -170,6 +169,7 @@ class Following:
         place, pixel = (math.nan, math.nan), (math.nan, math.nan)
         if whole:
             place, pixel = self._place(found.pose)
+        magnified = self.learnt.known.start.body.optics.focal / self.learnt.sight.optics.focal  # to the stated scale
         self._take(frame.time, place[0], body_angle, tail_phase)
         self.readings.add((frame.time, place[0], body_angle, tail_phase, *roll, *tail))
         self._look(frame)
@@ -185,7 +185,7 @@ class Following:
             heading=found.pose.heading - self.roll if whole else math.nan,
             body_angle=body_angle,
             tail_phase=tail_phase,
-            position_error=self._magnified(found) if whole else math.nan,
+            position_error=found.error.x * magnified if whole else math.nan,
             heading_error=found.error.heading if whole else math.nan,
             body_angle_error=roll[1] if math.isfinite(body_angle) else math.nan,
             tail_phase_error=tail[1] if math.isfinite(tail_phase) else math.nan,
@@ -195,11 +195,6 @@ class Following:
             flags=self.flags,
         )
         return _without_spoiled(seen)
-
-    def _magnified(self, found: PoseFit) -> float:
-        """Standard error of the position at the stated scale, m."""
-        known, sight = self.learnt.known.start.body.optics, self.learnt.sight.optics
-        return found.error.x * known.focal / sight.focal
 
     def _place(self, pose: BodyPose) -> tuple[tuple[float, float], tuple[float, float]]:
         """Along and across the channel, m, and the pixel of the body's mid-length."""

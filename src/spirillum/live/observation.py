@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, finite, quantity
 from spirillum.measurement.setup_template import scale_confirmed, setup_remarks
 from spirillum.measurement.trials import RATE_NAMES, Measured, Trial
 from spirillum.notes import Note
@@ -57,18 +57,14 @@ class Observation(DisplayMixin):
             content["reason"] = self.reason
         if self.state != "learning":
             content |= {
-                "position": quantity([self.x, self.y], "m", standard_error=_known(self.position_error)),
-                "heading": quantity(self.heading, "rad", standard_error=_known(self.heading_error)),
-                "body_angle": quantity(self.body_angle, "rad", standard_error=_known(self.body_angle_error)),
-                "tail_phase": quantity(self.tail_phase, "rad", standard_error=_known(self.tail_phase_error)),
+                "position": quantity([self.x, self.y], "m", standard_error=finite(self.position_error)),
+                "heading": quantity(self.heading, "rad", standard_error=finite(self.heading_error)),
+                "body_angle": quantity(self.body_angle, "rad", standard_error=finite(self.body_angle_error)),
+                "tail_phase": quantity(self.tail_phase, "rad", standard_error=finite(self.tail_phase_error)),
                 "pixel": quantity(list(self.pixel), "px"),
             }
             content |= {name: item.to_dict() for name, item in self.rates.items()}
         return envelope("live-observation", content, [flag.note for flag in self.flags])
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 @dataclass(frozen=True, repr=False)

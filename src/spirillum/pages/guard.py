@@ -113,10 +113,6 @@ class Guard:
         """Whether it is the key, in constant time."""
         return secrets.compare_digest(key.encode(), self.key.encode())
 
-    def opens(self, path: str) -> bool:
-        """Whether a path begins with the key."""
-        return self.right_key(path.split("/", 2)[1] if path.startswith("/") else "")
-
 
 def is_loopback(host: str) -> bool:
     """Whether an address is reached from this machine alone."""

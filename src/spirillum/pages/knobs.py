@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import re
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from spirillum.data_tables import rows_of
+from spirillum.data_tables import records_of
 from spirillum.errors import InputError, check_choice, clipped
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -77,15 +77,7 @@ class Knob:
     needs: str = ""  #: Table of the robot without which it is not shown.
 
 
-def _knobs() -> Iterator[Knob]:
-    """The rows of `knobs.csv`; a choice has no range."""
-    for row in rows_of("pages/knobs.csv"):
-        words: Any = {name: row[name] for name in ("field", "label", "group", "unit", "kind", "note", "unset", "needs")}
-        ends: Any = {end: float(row[end]) for end in ("low", "high") if row[end]}
-        yield Knob(**words, **ends, choices=tuple(row["choices"].split()), logarithmic=row["logarithmic"] != "")
-
-
-KNOBS = tuple(_knobs())  #: All knobs, in their order, without the model, the remote and the duty.
+KNOBS = records_of("pages/knobs.csv", Knob)  #: All knobs, in their order, without the model, the remote and the duty.
 
 MODELS = ("auto", "tube", "slender", "rft")  #: Models that can move a free robot.
 _BY_FIELD = {knob.field: knob for knob in KNOBS}

@@ -9,14 +9,14 @@ import atexit
 import math
 import shutil
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.calibration.methods import METHODS
-from spirillum.data_tables import rows_of
+from spirillum.data_tables import records_of
 from spirillum.errors import InputError, check_choice, clipped
 from spirillum.files import scratch_folder
 from spirillum.pages.job import BackgroundJob
@@ -49,16 +49,7 @@ class Entry:
     uncertain: bool = False  #: Whether it has a standard uncertainty in a field of its own.
 
 
-def _entries() -> Iterator[Entry]:
-    """The rows of `setup_form.csv`."""
-    for row in rows_of("pages/setup_form.csv"):
-        words: Any = {name: row[name] for name in ("field", "label", "group", "example", "note")}
-        yield Entry(
-            **words, choices=tuple(row["choices"].split()), number=row["number"] != "", uncertain=row["uncertain"] != ""
-        )
-
-
-FORM = tuple(_entries())  #: Fields of the form, without the robot's file.
+FORM = records_of("pages/setup_form.csv", Entry)  #: Fields of the form, without the robot's file.
 
 _NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
 _KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}

@@ -59,14 +59,8 @@ def _work(request: dict[str, Any], progress: Progress) -> dict[str, Any]:
     if request["what"] == "calibrate":
         from spirillum.results.calibration import calibrate
 
-        found = calibrate(
-            request["observations"],
-            request["robot"],
-            output,
-            model=request["model"],
-            method=request["method"],
-            progress=progress,
-        )
+        chosen = {name: request[name] for name in ("model", "method")}
+        found = calibrate(request["observations"], request["robot"], output, **chosen, progress=progress)
         answer = found.to_dict()
         return {
             "shown": {

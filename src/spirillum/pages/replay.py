@@ -44,10 +44,7 @@ def replay_of_run(dataset: xr.Dataset) -> dict[str, Any]:
         "roughness": float(roughness) if roughness is not None else None,
         "samples": int(poses.time.size),
         "run": {
-            "time": poses.time[chosen].tolist(),
-            "position": poses.position[chosen].tolist(),
-            "attitude": poses.attitude[chosen].tolist(),
-            "tail_phase": poses.tail_phase[chosen].tolist(),
+            **{name: getattr(poses, name)[chosen].tolist() for name in ("time", "position", "attitude", "tail_phase")},
             "duty": _series(dataset, "duty", chosen),
             "values": {name: _series(dataset, name, chosen) for name in SERIES if _is_series(dataset, name)},
         },

@@ -7,6 +7,7 @@ import json
 import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from typing import Any
 
 from starlette.applications import Starlette
@@ -86,7 +87,8 @@ class _Guarded:
             return "another page has no business here"
         if origin is None and (scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")):
             return "a request without its origin"
-        return "" if guard.opens(scope["path"]) else _MISSING
+        before, _, after = scope["path"].partition("/")  # which the key begins
+        return _MISSING if before or not guard.right_key(after.partition("/")[0]) else ""
 
     def _is_printed_address(self, scope: Scope) -> bool:
         """Whether a request is for the address that `page` prints, `/?key=...`."""
@@ -188,7 +190,7 @@ def application(
         *[Route(f"/keep/{name}", _kept(name, house.simulation)) for name in _KEPT],
         *session_routes(house.session, house.simulation, uploads),
         Route("/flow", _flow(house.simulation)),
-        Route("/first-run", _first(first_run)),
+        Route("/first-run", _fixed(partial(json.dumps, first_run), "application/json")),
         Route("/replay", _sent(replay_of_upload, LARGEST_RUN, uploads), methods=["POST"]),
         Route("/study", _sent(_study(house.simulation), LARGEST_STUDY_SENT, uploads), methods=["POST"]),
         WebSocketRoute("/live", house.connect),
@@ -254,11 +256,17 @@ def _heard(text: str, client: _Client, simulation: SimulationThread, loop: async
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def _file(name: str) -> Handler:
+def _fixed(content: Callable[[], str], media: str) -> Handler:
+    """Serve a text that no request changes."""
+
     async def serve(_request: Request) -> Response:
-        return Response(asset(name), media_type=_TYPES[name.rpartition(".")[2]])
+        return Response(content(), media_type=media)
 
     return serve
+
+
+def _file(name: str) -> Handler:
+    return _fixed(partial(asset, name), _TYPES[name.rpartition(".")[2]])
 
 
 _KEPT = ("robot.toml", "commands.txt", "robot.py", "run.html", "run.json", "words.json")
@@ -301,15 +309,6 @@ def _flow(simulation: SimulationThread) -> Handler:
     return serve
 
 
-def _first(run: dict[str, Any] | None) -> Handler:
-    text = json.dumps(run)
-
-    async def serve(_request: Request) -> Response:
-        return Response(text, media_type="application/json")
-
-    return serve
-
-
 def _study(simulation: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
     """Picture of an uploaded study's dataset, or of the paper's."""
 
@@ -317,7 +316,7 @@ def _study(simulation: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
         from spirillum.results.study import study
 
         found = sent_study(content) if content else StudyPicture(study())
-        simulation.show_study(found)
+        simulation.study = found  # whose tails can be pointed at from now on
         return found.describe()
 
     return picture

@@ -74,7 +74,7 @@ class SimulationThread:
         self._swimmers = [PageRobot.of(self._own)]
         self._preparing: Preparing | None = None
         self._left_off: Robot | None = None
-        self._study: StudyPicture | None = None
+        self.study: StudyPicture | None = None  #: What tails can be pointed at in.
         self._playing, self._pace, self._looked_at = True, 1.0, False
         self._ending = threading.Event()
         self._requested: list[int] = []
@@ -156,10 +156,6 @@ class SimulationThread:
                 return None
             swimmer = self._swimmers[index]
             return swimmer, swimmer.recording.data()
-
-    def show_study(self, study: StudyPicture) -> None:
-        """Let its tails be pointed at."""
-        self._study = study
 
     def flow(self, index: int) -> dict[str, Any] | None:
         """The plane of the flow around a robot; None if there is none."""
@@ -251,9 +247,9 @@ class SimulationThread:
             swimmer.set(name, value)
 
     def _tail(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
-        if self._study is None:
+        if self.study is None:
             raise InputError("tail: no study is shown; allowed: a study first")
-        swimmer.swap(*self._study.tail(command))
+        swimmer.swap(*self.study.tail(command))
 
     def _restart(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
         for swimmer in self._swimmers:

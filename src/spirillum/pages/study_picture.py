@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.dynamics.run_file import robot_of_settings
+from spirillum.envelope import finite
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf
 from spirillum.pages.video_store import read_upload
@@ -60,7 +60,7 @@ class StudyPicture:
             "models": [str(name) for name in self._speed["model"].values],
             "wavelengths": [float(value) for value in self._speed["wavelength"].values],
             "amplitudes": [float(value) for value in self._speed["amplitude"].values],
-            "speeds": _plain(values),
+            "speeds": finite(values.astype(float)),
         }
 
     def tail(self, command: Mapping[str, Any]) -> tuple[Robot, dict[str, str]]:
@@ -88,9 +88,3 @@ def _robots(dataset: xr.Dataset) -> list[Robot]:
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise InputError(f"this dataset has no attribute 'settings' with its robots; allowed: {_WHAT}") from error
     return [robot_of_settings(table, "the study's") for table in tables]
-
-
-def _plain(values: Any) -> Any:
-    if isinstance(values, np.ndarray):
-        return [_plain(part) for part in values]
-    return float(values) if math.isfinite(values) else None
