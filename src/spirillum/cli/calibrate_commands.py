@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -101,6 +101,14 @@ def _stated(given: Sequence[str]) -> dict[str, str]:
 _A = TypeVar("_A", "Ranking", "Suggestion")
 
 
+def _robots_of(robot: list[str] | None, settings: list[str] | None, posterior: Path | None = None) -> Any:
+    """The named robots, or with settings the paper's; None: those that the function takes."""
+    from spirillum.robot.load import PAPER_ROBOTS
+
+    names = robot or (PAPER_ROBOTS if settings else ())
+    return [loaded_robot(name, settings, posterior=posterior) for name in names] or None
+
+
 def _note_robots_taken(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
     """Refuse settings without a named robot, where the robots come from another file."""
     from spirillum.robot.load import PAPER_ROBOTS_TAKEN
@@ -130,15 +138,13 @@ def rank_models(
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import free_by_model
     from spirillum.robot.arguments import set_fields
-    from spirillum.robot.load import PAPER_ROBOTS
     from spirillum.swimming.released_motion import HELD, RELEASED
 
     fields, answer = set_fields(overrides_from(settings)), request.typed.get("answer", HELD)
     for name, fitted in free_by_model(request.typed.get("models"), request.typed.get("free"), answer).items():
         check_not_set(fields, fitted, name, released=answer == RELEASED)
-    names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
-        robots = [loaded_robot(name, settings) for name in names] or None
+        robots = _robots_of(robot, settings)
         found = request(observations, robots, sampling=Sampling(**request.take("sampling")), progress=progress)
     renderer.show(_note_robots_taken(found, robot, settings).to_dict(), json=json)
     if not all(item.fit.converged for item in found.ranked):
@@ -161,14 +167,12 @@ def suggest(
     """
     from spirillum.calibration.parameters import OBSERVED
     from spirillum.robot.arguments import set_fields
-    from spirillum.robot.load import PAPER_ROBOTS
 
     if rows < 1:
         raise InputError(f"rows = {rows}; allowed: at least 1")
     if own := [field for field in OBSERVED if field in set_fields(overrides_from(settings))]:
         raise InputError(f"{own[0]} is set, and every candidate has its own; allowed: other fields, or --candidates")
-    names = robot or (PAPER_ROBOTS if settings else ())
-    robots = [loaded_robot(name, settings, posterior=posterior) for name in names] or None
+    robots = _robots_of(robot, settings, posterior)
     with renderer.progress_bar(quiet=json) as progress:
         found = _note_robots_taken(request(posterior, robots, progress=progress), robot, settings)
     renderer.show(found.to_dict(), json=json, rows=rows)

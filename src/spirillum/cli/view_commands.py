@@ -48,30 +48,23 @@ def show(request: Request, *, output: Path | None = None, window: bool = False, 
     renderer.show(found.to_dict(), json=json)
 
 
-def film(
-    run: Path,
-    output: Path,
-    view: str = "perspective",
-    size: str = "1280x720",
-    fps: int = 30,
-    speed: float | None = None,
-    camera: str = "auto",
-    json: Json = False,
-) -> None:
+@from_function(
+    "spirillum.view.scene3d.film:film",
+    without={"dataset": "the argument", "path": "-o FILE"},
+    complete={"camera": choices("auto", "fixed", "follow")},
+    robot=None,
+)
+def film(request: Request, *, run: Path, output: Path, view: str = "perspective", json: Json = False) -> None:
     """Film a run of `simulate` in three dimensions, to show to people. Needs the extra `3d`.
 
     Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
     """
     from spirillum.dynamics.run_file import open_run
     from spirillum.files import output_target
-    from spirillum.view.scene3d.film import film as answer
     from spirillum.view.scene3d.rendering import FILMS
 
     output_target(output, FILMS, "run.mp4")
-    dataset = open_run(run)
-    with renderer.progress_bar(quiet=json) as progress:
-        found = answer(dataset, output, view=view, size=size, fps=fps, speed=speed, camera=camera, progress=progress)
-    renderer.show(found.to_dict(), json=json)
+    request.show(open_run(run), output, view=view, json=json)
 
 
 @from_function(

@@ -5,7 +5,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics.run_file import Poses, rolled
-from spirillum.view.figures.run_panels import silhouette
+from spirillum.view.figures.trajectory import silhouette
 from spirillum.view.scene3d.film import CrossSection
 
 SIZE = (640, 360)

@@ -236,16 +236,12 @@ def _draw_frame(axes: Axes, s: DrawingLayout) -> None:
     axes.text(s.left + edge, line, plain(s.robot.name, 60), va="top", size=9, weight="bold", color=INK)
     small: dict[str, Any] = {"va": "top", "ha": "right", "size": 7.5, "color": FAINT}
     axes.text(s.right - edge, line - 0.002 * s.total, "computed geometry, to scale", **small)
-    _compass(axes, s)
+    x, z, size = s.left + 0.025 * s.total, s.bottom + 0.025 * s.total, 0.055 * s.total
+    for dx, dz, name in ((size, 0.0, "$x$"), (0.0, size, "$z$")):
+        arrow(axes, (x, z), (x + dx, z + dz), mutation_scale=6, linewidth=0.9)
+        label(axes, x + 1.22 * dx, z + 1.22 * dz, name)
     length = round_length(0.16 * s.total * s.scale.factor)
     end = s.right - 0.02 * s.total
     start, z = end - length / s.scale.factor, s.bottom + 0.030 * s.total
     axes.plot([start, end], [z, z], color=INK, linewidth=2.0, solid_capstyle="butt", zorder=12)
     label(axes, 0.5 * (start + end), z + 0.022 * s.total, in_words(length, "m"))
-
-
-def _compass(axes: Axes, s: DrawingLayout) -> None:
-    x, z, size = s.left + 0.025 * s.total, s.bottom + 0.025 * s.total, 0.055 * s.total
-    for dx, dz, name in ((size, 0.0, "$x$"), (0.0, size, "$z$")):
-        arrow(axes, (x, z), (x + dx, z + dz), mutation_scale=6, linewidth=0.9)
-        label(axes, x + 1.22 * dx, z + 1.22 * dz, name)

@@ -60,10 +60,9 @@ def write_beside(axes: Axes, text: str, at: tuple[float, float], shift: tuple[fl
 
 
 class Sheet:
-    """A figure with a grid of lettered panels of given height below title, subtitle and legend, notes at the foot.
+    """A figure with a grid of lettered panels of given height below title, subtitle and legend, notes at the foot."""
 
-    Widths and heights are in inches; a formula in a note must not contain a space.
-    """
+    # Widths and heights are in inches; a formula in a note must not contain a space.
 
     def __init__(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -103,6 +103,15 @@ def _omitted_note(shown: StudyView, wavelengths: int, channels: int) -> str:
     return f"Shown: {', '.join(parts)}; the dataset holds all." if parts else ""
 
 
+def _picture(
+    shown: StudyView, title: str, notes: Sequence[str], alternative: str, draw: Callable[[list[str]], Figure]
+) -> Picture:
+    """A picture of a study with its notes, which `draw` takes too; empty ones are left out."""
+    said = [note for note in notes if note]
+    caption, words = " ".join([shown.source_line, *said]), f"{alternative} {shown.source_line}"
+    return Picture.of(title, caption, words, partial(draw, said))
+
+
 def _channel_picture(shown: StudyView, channel: int, wavelengths: list[int], page: str, left_out: str) -> Picture:
     name = str(shown.whole["channel"].values[channel])
     title = _channel_title(shown, channel)
@@ -113,15 +122,13 @@ def _channel_picture(shown: StudyView, channel: int, wavelengths: list[int], pag
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
     amplitudes = spread(shown.whole.sizes["amplitude"], MOST_TAILS)
     part = shown.part(channel=channel, wavelength=wavelengths)
-    notes = [row.tells for row in rows if row.tells]
-    notes += [part.unanswered(), left_out]
-    draw = partial(_draw_channel, shown, channel, wavelengths, amplitudes, title, rows, [n for n in notes if n])
-    caption = " ".join([shown.source_line, *(note for note in notes if note)])
     alternative = (
         f"{len(rows) * len(wavelengths)} panels, one column for each of {len(wavelengths)} wavelengths, against "
-        f"the wave amplitude. Rows: {what}. {shown.source_line}"
+        f"the wave amplitude. Rows: {what}."
     )
-    return Picture.of(title, caption, alternative, draw)
+    notes = [*(row.tells for row in rows), part.unanswered(), left_out]
+    draw = partial(_draw_channel, shown, channel, wavelengths, amplitudes, title, rows)
+    return _picture(shown, title, notes, alternative, draw)
 
 
 def _draw_channel(
@@ -206,22 +213,14 @@ def _bound_picture(shown: StudyView) -> Picture:
             "(the paper does not specify it), $U\\,=\\,Re\\,\\mu/(\\rho\\,D_b)$."
         )
     part = shown.part(channel=channels, wavelength=wavelengths)
-    notes += [
-        note
-        for note in (
-            bound_row(shown).tells if shown.settled else "",
-            shown.pose_words,
-            part.unanswered(),
-            _omitted_note(shown, len(wavelengths), len(channels)),
-        )
-        if note
-    ]
+    settled = bound_row(shown).tells if shown.settled else ""
+    left_out = _omitted_note(shown, len(wavelengths), len(channels))
+    notes += [settled, shown.pose_words, part.unanswered(), left_out]
     alternative = (
         f"{len(channels) * len(wavelengths)} panels, a row for each channel and a column for each wavelength: forward "
-        f"velocity against wave amplitude{' as an upper bound' if whole_bound else ''}. {shown.source_line}"
+        f"velocity against wave amplitude{' as an upper bound' if whole_bound else ''}."
     )
-    draw = partial(_draw_bound, shown, channels, wavelengths, title)
-    return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
+    return _picture(shown, title, notes, alternative, lambda _: _draw_bound(shown, channels, wavelengths, title))
 
 
 def _frictions(shown: StudyView) -> list[str]:
@@ -293,15 +292,12 @@ def _robots_picture(shown: StudyView) -> Picture:
     indices = spread(count, MOST_ROBOTS)
     rows = robot_rows(shown)
     title = f"{plain(str(shown.whole.attrs.get('title', 'Robots')), 60)} · {count} robots"
-    notes = list(dict.fromkeys(row.tells for row in rows if row.tells))
-    notes.append(shown.unanswered())
+    notes = [*dict.fromkeys(row.tells for row in rows), shown.unanswered()]
     if len(indices) < count:
         notes.append(f"Shown: {len(indices)} of {count} robots, evenly spread; the dataset contains all.")
-    notes = [note for note in notes if note]
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
-    alternative = f"{len(rows)} panels with a point for each of {len(indices)} robots: {what}. {shown.source_line}"
-    draw = partial(_draw_robots, shown, indices, title, rows, notes)
-    return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
+    alternative = f"{len(rows)} panels with a point for each of {len(indices)} robots: {what}."
+    return _picture(shown, title, notes, alternative, partial(_draw_robots, shown, indices, title, rows))
 
 
 def _draw_robots(

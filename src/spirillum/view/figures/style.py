@@ -89,10 +89,8 @@ class UnitPrefix:
 
     @classmethod
     def of(cls, values: Values, unit: str) -> UnitPrefix:
-        """Unit for SI `values` of an SI `unit`, with a prefix by which the largest is between 0.1 and 100, if possible.
-
-        Rates are shown in Hz, angles in degrees, shares as they are: none of them with a prefix.
-        """
+        """Unit for SI `values`, with a prefix by which the largest is between 0.1 and 100, if possible."""
+        # Rates are shown in Hz, angles in degrees, shares as they are: none of them with a prefix.
         if unit in _WITHOUT_PREFIX:
             shown = for_people(unit)
             return cls(1.0 / shown_in(1.0, shown) if shown != unit else 1.0, shown)
@@ -180,11 +178,8 @@ def _spelled(formula: str) -> str:
 
 
 def save(figure: Figure, path_without_suffix: Path, *, vector: bool = False) -> list[Path]:
-    """Write a PNG (200 dpi) and, if requested, an SVG (text as paths, no date), each whole or not at all.
-
-    Returns:
-        The paths. An SVG of an earlier figure beside a PNG of this one is removed.
-    """
+    """Write a PNG (200 dpi) and, if requested, an SVG (text as paths, no date), each whole; give their paths."""
+    # An SVG of an earlier figure beside a PNG of this one is removed.
     folder, name = path_without_suffix.parent, path_without_suffix.name
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     engine, dpi = figure.get_layout_engine(), figure.dpi

@@ -21,9 +21,9 @@ from spirillum.progress import Progress, tell
 from spirillum.robot.robot import Robot
 from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.units import display_unit, show
-from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK, round_length
 from spirillum.view.figures.style import COLOURS, with_micro
+from spirillum.view.figures.trajectory import silhouette
 from spirillum.view.scene3d.rendering import FILMS, video_writer
 from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
 from spirillum.view.scene3d.show import checked_size, glass_around, scene_points
@@ -184,7 +184,7 @@ def film(
     inset = None
     if released and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
-    shots = _Shots(solids, poses, view, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
+    shots = _Shots(solids, poses, view, pixels, follows, _channel_centre(dataset), inset)
     with atomic_write(target) as temporary, video_writer(temporary, pixels, fps, words) as writer:
         about = ", ".join(filter(None, (_about(dataset, model), ASSUMPTION if released else "")))
         with closing(shots.images(times, about, speed)) as images:
@@ -207,71 +207,67 @@ def _about(dataset: xr.Dataset, model: str) -> str:
     return ", ".join(found)
 
 
+@dataclass
 class _Shots:
     """Frames of a video: scene and view."""
 
-    def __init__(
-        self,
-        solids: DrawnRobot,
-        poses: Poses,
-        view: str,
-        size: tuple[int, int],
-        *,
-        follows: bool,
-        middle: float | None,
-        inset: CrossSection | None,
-    ) -> None:
-        self._solids, self._poses, self._view, self._size, self._follows = solids, poses, view, size, follows
-        self._inset = inset
-        in_glass = solids.robot.channel is not None
+    solids: DrawnRobot
+    poses: Poses
+    view: str
+    size: tuple[int, int]
+    follows: bool
+    middle: float | None  # of the channel, m
+    inset: CrossSection | None
+
+    def __post_init__(self) -> None:
+        in_glass = self.solids.robot.channel is not None
         self._free = np.array([1.0, 0.0, 0.0]) if in_glass else np.ones(3)
         """Directions in which the camera follows: in a channel along its axis."""
-        x, beyond = poses.position[:, 0], 1.5 * solids.length if follows else 0.0
-        self._glass = glass_around(solids, float(x.min()) - beyond, float(x.max()) + beyond, middle)
+        x, beyond = self.poses.position[:, 0], 1.5 * self.solids.length if self.follows else 0.0
+        self._glass = glass_around(self.solids, float(x.min()) - beyond, float(x.max()) + beyond, self.middle)
         self._camera, self._rows = self._framed()
 
     def _framed(self) -> tuple[SceneCamera, int | None]:
         """Camera of the first frame, and the rows about the middle that contain the content of all frames."""
-        several = [self._poses.at(float(time)) for time in np.linspace(self._poses.time[0], self._poses.time[-1], 60)]
+        several = [self.poses.at(float(time)) for time in np.linspace(self.poses.time[0], self.poses.time[-1], 60)]
         glass = self._glass
-        if self._follows:
+        if self.follows:
             start = several[0].position
             several = [pose._replace(position=pose.position - self._free * (pose.position - start)) for pose in several]
-            glass = glass_around(self._solids, float(start[0]), float(start[0]))
-        points = np.concatenate([scene_points(self._solids, pose, glass) for pose in several])
-        camera = fitted(self._view, points, self._size)
-        if self._follows and self._glass is not None:
-            points = np.concatenate([points, scene_points(self._solids, several[0], self._glass)])
-        height = camera.pixels(points, self._size)[:, 1] - 0.5 * self._size[1]
+            glass = glass_around(self.solids, float(start[0]), float(start[0]))
+        points = np.concatenate([scene_points(self.solids, pose, glass) for pose in several])
+        camera = fitted(self.view, points, self.size)
+        if self.follows and self._glass is not None:
+            points = np.concatenate([points, scene_points(self.solids, several[0], self._glass)])
+        height = camera.pixels(points, self.size)[:, 1] - 0.5 * self.size[1]
         rows = 2 * int(np.ceil(np.abs(height).max()) + 4)
-        return camera, rows if self._glass is not None and rows < self._size[1] else None
+        return camera, rows if self._glass is not None and rows < self.size[1] else None
 
     def images(self, times: Samples, line: str, speed: float) -> Generator[np.ndarray]:
         """The frames at times of the run."""
         from spirillum.view.scene3d.overlay import Stamp, blended_into, scale_bar, words_on
         from spirillum.view.scene3d.scene import Scene
 
-        first = self._poses.at(float(times[0]))
-        bar = scale_bar(self._camera, self._size, first.position)
+        first = self.poses.at(float(times[0]))
+        bar = scale_bar(self._camera, self.size, first.position)
         lines = [text for text in (line, "computed motion and geometry") if text]
-        words = blended_into(words_on(self._size, self._camera, bar, self._solids.robot.name, lines))
-        stamp = Stamp(self._size, times, speed)
-        with Scene(self._solids, self._size, glass=self._glass, rows=self._rows, quick=True) as scene:
+        words = blended_into(words_on(self.size, self._camera, bar, self.solids.robot.name, lines))
+        stamp = Stamp(self.size, times, speed)
+        with Scene(self.solids, self.size, glass=self._glass, rows=self._rows, quick=True) as scene:
             if self._glass is None:
-                corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
-                path = self._poses.position
-                scene.add_grid(
-                    self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0)
-                )
+                corners = self.solids.corners(self.poses.at(float(self.poses.time[0]))) - self.poses.position[0]
+                path = self.poses.position
+                low, high = path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0)
+                scene.add_grid(self.view, low, high)
             for time in times:
-                pose = self._poses.at(float(time))
+                pose = self.poses.at(float(time))
                 scene.place(pose)
                 shift = (pose.position - first.position) * self._free
-                scene.look(self._camera.moved(shift) if self._follows else self._camera)
+                scene.look(self._camera.moved(shift) if self.follows else self._camera)
                 image = words(scene.image())
                 stamp.write(image, float(time))
-                if self._inset is not None:
-                    self._inset.write(image, float(time), pose)
+                if self.inset is not None:
+                    self.inset.write(image, float(time), pose)
                 yield image
 
 

@@ -226,9 +226,8 @@ class Scene(AbstractContextManager["Scene"]):
         faces = np.concatenate([np.full((len(piece.faces), 1), 3), piece.faces], axis=1)
         mesh = self._pyvista.PolyData(np.asarray(piece.vertices / self.unit, dtype=np.float32), faces.ravel())
         mesh.cell_data["colour"] = np.round(255 * np.asarray(piece.colours)).astype(np.uint8)
-        smooth = mesh.compute_normals(
-            cell_normals=False, split_vertices=True, feature_angle=_SHARP, auto_orient_normals=False
-        )
+        edges = {"split_vertices": True, "feature_angle": _SHARP}
+        smooth = mesh.compute_normals(cell_normals=False, auto_orient_normals=False, **edges)
         look: dict[str, Any] = {"scalars": "colour", "rgb": True, "show_scalar_bar": False}
         if self._quick:
             look |= _QUICK if piece.name == "body" else _QUICK_METAL

@@ -67,10 +67,7 @@ class SceneCamera:
 def fitted(
     view: str, points: Samples, size: tuple[int, int], margins: tuple[float, float, float] = (0.05, 0.14, 0.14)
 ) -> SceneCamera:
-    """The camera of a view that has all points in the picture, as near as the margins allow.
-
-    `margins` are room at the sides, above and below, as shares of width and height.
-    """
+    """The camera of a view that has all points in the picture, as near as `margins` at sides, top and foot allow."""
     sight, up = (np.array(vector) for vector in _LINE_OF_SIGHT[view])
     sight = sight / np.linalg.norm(sight)
     up = up - (up @ sight) * sight
@@ -134,10 +131,8 @@ def _inner_colours() -> Samples:
 
 def _outer_colours() -> Samples:
     """Colours and alpha of the outer side, which is seen in front of the robot: clear but for a streak of light."""
-    streak = np.exp(-(((np.degrees(_AROUND) - 128.0) / 9.0) ** 2)) + 0.5 * np.exp(
-        -(((np.degrees(_AROUND) - 52.0) / 9.0) ** 2)
-    )
-    alpha = 0.32 * np.clip(streak, 0.0, 1.0)
+    left, right = (np.exp(-(((np.degrees(_AROUND) - middle) / 9.0) ** 2)) for middle in (128.0, 52.0))
+    alpha = 0.32 * np.clip(left + 0.5 * right, 0.0, 1.0)
     return np.concatenate([np.broadcast_to(to_rgb(_NEAR), (_SIDES, 3)), alpha[:, None]], axis=1)
 
 
