@@ -64,11 +64,10 @@ USUAL = {row["unit"]: tuple(row["read"].split("; ")) for row in _UNITS if row["r
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of quantity: what it is called, its SI unit, an example, and the range that makes sense.
+    """A kind of quantity: what it is called, its SI unit, an example, and the range that makes sense."""
 
-    The range is generous (micro-swimmers to metre-long models); it stops typing errors and overflow,
-    not unusual robots.
-    """
+    # The range is generous (micro-swimmers to metre-long models); it stops typing errors and overflow, not unusual
+    # robots.
 
     name: str
     unit: str
@@ -164,10 +163,6 @@ def _refusal(unit: str, spellings: Sequence[str], kind: Kind, hint: str) -> str:
     return f'"{unit}" is not a unit of {kind.name}; {hint}' if known else f'"{unit}" is not a known unit; {hint}'
 
 
-def _article(name: str) -> str:
-    return "an" if name[0] in "aeiou" else "a"
-
-
 def _clip(text: str, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
@@ -180,12 +175,11 @@ def parse_quantity(value: object, kind: Kind) -> float:
     """Read a quantity such as ``"18 mm"`` or a pint quantity into an SI float."""
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         value = f"{value.magnitude} {value.units}"
+    needed = f'allowed: a number with its unit, for example "{kind.example}"'
+    wrong = f"is not {'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}; {needed}"
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         shown = "a table or list" if isinstance(value, (dict, list)) else _clip(str(value))
-        raise InputError(
-            f"= {shown} is not {_article(kind.name)} {kind.name}; allowed: a number with its unit, for example "
-            f'"{kind.example}"'
-        )
+        raise InputError(f"= {shown} {wrong}")
     if not isinstance(value, str):
         number, unit = value if isinstance(value, float) else float(max(-(10**300), min(value, 10**300))), ""
         shown = f"{value:.6g}" if isinstance(value, float) else _clip(f"{value:d}" if abs(value) < 10**30 else "(huge)")
@@ -193,16 +187,13 @@ def parse_quantity(value: object, kind: Kind) -> float:
         found = _QUANTITY.fullmatch(plain_minus(value))
         shown = f'"{_clip(value)}"'
         if found is None or len(value) > 200:
-            raise InputError(
-                f"= {shown} is not {_article(kind.name)} {kind.name}; allowed: a number with its unit, for example "
-                f'"{kind.example}"'
-            )
+            raise InputError(f"= {shown} {wrong}")
         number, unit = float(found["number"]), (found["unit"] or "").strip()
         unit = f"1{unit}" if unit.startswith("/") else unit
     if not math.isfinite(number):
         raise InputError(f"= {shown} is not finite; allowed: {kind.allowed}")
     if not unit:
-        raise _NoUnitError(f'= {shown} has no unit; allowed: a number with its unit, for example "{kind.example}"')
+        raise _NoUnitError(f"= {shown} has no unit; {needed}")
     try:
         si = _scaled(number, _factor(unit, kind))
     except InputError as error:

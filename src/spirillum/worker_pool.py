@@ -81,10 +81,8 @@ def imap_unordered(
 
 @contextmanager
 def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor | None]:
-    """A process beside this one that runs `start`, such as imports, at once; it ends with the block.
-
-    None where other work leaves no core for it: its imports would take longer than what it does.
-    """
+    """A process beside this one that runs `start`, such as imports, at once; it ends with the block."""
+    # None where other work leaves no core for it: its imports would take longer than what it does.
     if slowdown(2) > BUSY:
         yield None
         return

@@ -33,7 +33,7 @@ from spirillum.measurement.observations import (
 from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.notes import Note
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robust import mad_scale
 from spirillum.swimming.sampled_resistance import error_of_mean
 
@@ -60,10 +60,8 @@ class Ratio:
         return error_of_mean(error, self.stated, self.scale, self.trials)
 
     def sampled_error(self, count: int, rng: np.random.Generator) -> Samples:
-        """Draws of the relative error of one trial, given the scatter, (count, 1); NaN without repeated trials.
-
-        Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.
-        """
+        """Draws of the relative error of one trial, given the scatter, (count, 1); NaN without repeated trials."""
+        # Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.
         freedom = float(self.freedom.sum())
         if freedom == 0:
             return np.full((1, 1), np.nan)
@@ -131,8 +129,7 @@ def tail_words(robot: Robot) -> str:
 
 def with_tail(robot: Robot, wavelength: float, amplitude: float) -> Robot:
     """A robot with another tail, m."""
-    tail = robot.tail.model_copy(update={"wavelength": wavelength, "amplitude": amplitude})
-    return robot.model_copy(update={"tail": tail})
+    return with_numbers(robot, {"tail.wavelength": wavelength, "tail.amplitude": amplitude})
 
 
 def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:

@@ -95,11 +95,9 @@ class Forward:
     def matrices(self, draws: Draws) -> Samples:
         """Balance matrices, (draws, robots, 3, 3), with all factors and dry friction in them."""
         scale = np.asarray(draws["viscosity"]) / self.viscosity if "viscosity" in draws else 1.0
-        factors = [np.asarray(draws.get(name, self.factors.get(name, 1.0))) for name in ("body_drag", "body_rotation")]
-        drag, rotation = self.isolated
-        full = with_body_factors(
-            self.resistance.whole(draws), (factors[0], factors[1]), (scale * drag, scale * rotation)
-        )
+        own = (np.asarray(draws.get(name, self.factors.get(name, 1.0))) for name in ("body_drag", "body_rotation"))
+        (on_drag, on_rotation), (drag, rotation) = own, self.isolated
+        full = with_body_factors(self.resistance.whole(draws), (on_drag, on_rotation), (scale * drag, scale * rotation))
         if self.contact is None or "friction_coefficient" not in draws:
             return full
         force = np.asarray(draws["friction_coefficient"]) * self.contact.weight
@@ -124,10 +122,8 @@ class Forward:
     def friction(
         self, draws: Draws, motor_rate: Samples, tail_share: Samples | None = None, reading: str = "rotor"
     ) -> Samples:
-        """B_eff of (18) at given motor rates, (draws, robots); `paper`: the body's torque row holds -K_m I.
-
-        `tail_share` is the observed omega/omega_m of each robot; None or NaN: as the model turns the body.
-        """
+        """B_eff of (18) at given motor rates, (draws, robots); `paper`: the body's torque row holds -K_m I."""
+        # `tail_share` is the observed omega/omega_m of each robot; None or NaN: as the model turns the body.
         s = self.balance(draws)
         turning = kinematics(s).turning
         torque, tail, rate = self._at_motor_rate(turning, draws, motor_rate, tail_share)
@@ -154,12 +150,8 @@ class Forward:
     def _motor(self, draws: Draws) -> Electrics:
         if self.electrics is None:
             raise InputError("the robots have no dc-motor; allowed: robots with [motor], [battery] and drive.kind")
-        changed = {
-            name: np.asarray(draws[name], dtype=float)
-            for name in ("torque_constant", "back_emf_constant")
-            if name in draws
-        }
-        return replace(self.electrics, **changed)
+        known = [name for name in ("torque_constant", "back_emf_constant") if name in draws]
+        return replace(self.electrics, **{name: np.asarray(draws[name], dtype=float) for name in known})
 
     def largest_difference(self, other: Forward, draws: Draws) -> float:
         """Largest relative difference of what both predict at draws."""
@@ -226,17 +218,14 @@ def tube_forward(
 
 def _tables(experiment: Experiment, batch: RobotBatch, progress: Progress | None, *, prepare: bool) -> TabledTube:
     """The robots' tables."""
-    found = tables_of(batch)
+    found: Sequence[TubeTable | None] = tables_of(batch)
     lacking = [label for label, table in zip(experiment.labels(), found, strict=True) if table is None]
     if lacking and not prepare:
         otherwise = ", or model 'sbt', which leaves out the walls"
         raise without_tables(experiment, lacking, "model 'tube' asks a table", "straight", otherwise)
-    made = (
-        prepared_tables(checked_geometries(experiment.robots), stage="straight", workers=1, progress=progress)
-        if lacking
-        else found
-    )
-    return TabledTube({table.key: table for table in made if table is not None})
+    if lacking:
+        found = prepared_tables(checked_geometries(experiment.robots), stage="straight", workers=1, progress=progress)
+    return TabledTube({table.key: table for table in found if table is not None})
 
 
 def without_tables(

@@ -62,10 +62,8 @@ class Identifiability:
 
 
 def check_identifiable(problem: Problem, z: Samples) -> None:
-    """Refuse free parameters that no observations of these quantities identify, however exact.
-
-    A number whose uncertainty is stated is known by that, and left out.
-    """
+    """Refuse free parameters that no observations of these quantities identify, however exact."""
+    # A number whose uncertainty is stated is known by that, and left out.
     kept = [n for n, item in enumerate(problem.coordinates) if item.parameter.name not in problem.assumed]
     if len(kept) < 2:
         return
@@ -207,11 +205,9 @@ def friction_sensitivity(problem: Problem, z: Samples, reading: str) -> dict[str
 
 
 def torque_error(problem: Problem) -> float | None:
-    """Return half of the relative 95 % interval of the model's torque on the tails: the largest error that is known.
-
-    That of the wire, as against resolved wires, and of the table. None for a model that leaves the walls of the robots'
-    tubes out: no observation determines what these do to the torque.
-    """
+    """Return half of the relative 95 % interval of the model's torque on the tails: the largest error that is known."""
+    # That of the wire, as against resolved wires, and of the table. None for a model that leaves the walls of the
+    # robots' tubes out: no observation determines what these do to the torque.
     if not problem.model.placed:
         return None
     robots = problem.experiment.robots

@@ -216,11 +216,9 @@ def _thinned(density: Density, chains: list[Samples], samplers: list[_Ensemble],
 
 
 def _diagnosed(density: Density, chains: list[Samples], whole: Samples) -> tuple[dict[str, float], dict[str, float]]:
-    """R-hat and effective sample size of every number by ArviZ.
-
-    R-hat compares the ensembles, each with all draws of its walkers in the order of steps, in halves; the effective
-    sample size takes each walker for a chain, whose own correlation in time it sees.
-    """
+    """R-hat and effective sample size of every number by ArviZ."""
+    # R-hat compares the ensembles, each with all draws of its walkers in the order of steps, in halves; the effective
+    # sample size takes each walker for a chain, whose own correlation in time it sees.
     from arviz_stats.base.array import array_stats
 
     rhat, effective = {}, {}

@@ -177,7 +177,11 @@ def suggest(
         trials,
         answer,
         tuple(
-            replace(item, behind=best.gain - item.gain, behind_error=_jackknife(of_best - gains))
+            replace(
+                item,
+                behind=best.gain - item.gain,
+                behind_error=float(np.sqrt((gains.size - 1.0) * np.var(of_best - gains))),  # the jackknife's
+            )
             for item, gains in ordered
         ),
         (
@@ -263,11 +267,6 @@ def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
             several = values.shape[1] > 1
             names.append(f"{name}[{known.channels[place] * 1e3:g} mm]" if several else name)
     return np.stack(columns, axis=1), names
-
-
-def _jackknife(left_out: Samples) -> float:
-    """Standard error of a number from its values where one block after another is left out."""
-    return float(np.sqrt((left_out.size - 1.0) * np.var(left_out)))
 
 
 def _information(seen: Samples, noise: Samples) -> tuple[float, Samples, Samples]:

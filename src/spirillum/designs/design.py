@@ -241,11 +241,9 @@ def _answer(
 
 
 def _share(flags: Flags, sets: int) -> tuple[float, float, float]:
-    """A probability with its 95 % interval.
-
-    From sets that fill the ranges evenly, by Student's t over their means, for such sets are surer than as many
-    independent draws (Owen 1997). From independent draws, and where all sets agree, by Clopper and Pearson 1934.
-    """
+    """A probability with its 95 % interval."""
+    # From sets that fill the ranges evenly, by Student's t over their means, for such sets are surer than as many
+    # independent draws (Owen 1997). From independent draws, and where all sets agree, by Clopper and Pearson 1934.
     from scipy.stats import binomtest, t
 
     share = float(np.mean(flags))

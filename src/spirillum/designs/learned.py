@@ -63,13 +63,10 @@ class Points:
 
     def joined(self, more: Points) -> Points:
         """These points and those of others that differ from them."""
-        new = [row for row, at in enumerate(more.features) if not self.has(at)]
+        apart = np.abs(more.features[:, None] - self.features)
+        new = ~np.any(np.all(apart < 1e-9, axis=2), axis=1)
         features = np.concatenate([self.features, more.features[new]])
         return replace(self, features=features, logarithms=np.concatenate([self.logarithms, more.logarithms[new]]))
-
-    def has(self, feature: Samples) -> bool:
-        """Whether one of the points is near."""
-        return bool(np.any(np.all(np.abs(self.features - feature) < 1e-9, axis=1)))
 
     def at(self, features: Samples) -> Samples:
         """Upper triangle of log C at designs, (designs, 6)."""

@@ -131,21 +131,17 @@ def _check(stored: h5py.File, path: Path, what: str, largest: int) -> None:
         group, depth = ahead.pop()
         count += len(group)
         if count > MOST_VARIABLES or depth > _DEEPEST:
-            raise InputError(f"{path} holds more than {MOST_VARIABLES} variables or deep groups; {_only(what)}")
+            raise InputError(f"{path} holds more than {MOST_VARIABLES} variables or deep groups; allowed: {what}")
         for name in group:
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                raise InputError(f"{path} holds a link to another place; {_only(what)}")
+                raise InputError(f"{path} holds a link to another place; allowed: {what}")
             item = group[name]
             if isinstance(item, h5py.Group):
                 ahead.append((item, depth + 1))
             elif isinstance(item, h5py.Dataset):
                 total += _declared(item, path, what)
                 if total > largest:
-                    raise InputError(f"{path} declares arrays of more than {largest} bytes; {_only(what)}")
-
-
-def _only(what: str) -> str:
-    return f"allowed: {what}"
+                    raise InputError(f"{path} declares arrays of more than {largest} bytes; allowed: {what}")
 
 
 def _declared(item: Any, path: Path, what: str) -> int:
@@ -153,14 +149,14 @@ def _declared(item: Any, path: Path, what: str) -> int:
     import h5py
 
     if item.external or item.is_virtual:
-        raise InputError(f"{path} takes values from other files; {_only(what)}")
+        raise InputError(f"{path} takes values from other files; allowed: {what}")
     size: int = prod(item.shape or ()) * item.dtype.itemsize
     if item.chunks is not None:
         chunk = prod(item.chunks) * item.dtype.itemsize
         if chunk > _LARGEST_CHUNK or any(
             item.id.get_chunk_info(number).size > 2 * chunk + 1024 for number in range(item.id.get_num_chunks())
         ):
-            raise InputError(f"{path} holds pieces that are larger than they should be; {_only(what)}")
+            raise InputError(f"{path} holds pieces that are larger than they should be; allowed: {what}")
     if h5py.check_string_dtype(item.dtype) is not None and item.dtype.hasobject:
         size += _texts(item, path, what)
     return size
@@ -170,11 +166,11 @@ def _texts(item: Any, path: Path, what: str) -> int:
     count = prod(item.shape or ())
     if count * item.file.id.get_filesize() <= _LONGEST_TEXTS or item.ndim != 1:
         if item.ndim > 1 and count > MOST_VARIABLES:
-            raise InputError(f"{path} holds {count} texts; {_only(what)}")
+            raise InputError(f"{path} holds {count} texts; allowed: {what}")
         return 64 * count
     total = 0
     for start in range(0, count, 64):
         total += sum(len(text) for text in item[start : start + 64])
         if total > _LONGEST_TEXTS:
-            raise InputError(f"{path} holds texts of more than {_LONGEST_TEXTS} bytes; {_only(what)}")
+            raise InputError(f"{path} holds texts of more than {_LONGEST_TEXTS} bytes; allowed: {what}")
     return total + 64 * count

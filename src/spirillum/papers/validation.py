@@ -101,12 +101,12 @@ class ValidationRow:
         """The row as data, SI."""
         si, covered, (low, high) = self.quantity.si_value, self.covered_by, self.ends
         within = self.recorded_within * abs(self.recorded)
+        stated = {"published": self.published, "uncertainty": self.uncertainty}
         return {
             "case": self.case,
             "point": self.point,
             "quantity": self.quantity.label,
-            "published": _times(si, self.published),
-            "uncertainty": _times(si, self.uncertainty),
+            **{name: None if value is None else si * value for name, value in stated.items()},
             "unit": self.quantity.si_unit or self.quantity.unit,
             "ours": si * self.ours,
             "difference": self.difference,
@@ -122,10 +122,6 @@ class ValidationRow:
             "as_recorded": self.is_as_recorded,
             "computed": self.computed,
         }
-
-
-def _times(factor: float, value: float | None) -> float | None:
-    return None if value is None else factor * value
 
 
 @dataclass(frozen=True)

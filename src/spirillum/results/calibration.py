@@ -12,10 +12,9 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
+from spirillum.calibration.parameters import Estimate
 from spirillum.calibration.posterior import Sampling
 from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inputs, output_folder, results_folder
 from spirillum.fitted.posterior_file import write_posterior
@@ -199,11 +198,9 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             progress=progress,
             beside=beside,
         )
-        return (
-            found
-            if folder is None
-            else write_calibration(found, folder, figures=figures, vector=vector, beside=beside, progress=progress)
-        )
+        if folder is None:
+            return found
+        return write_calibration(found, folder, figures=figures, vector=vector, beside=beside, progress=progress)
 
 
 def write_calibration(
@@ -278,10 +275,8 @@ def predictions_text(found: Calibrated) -> str:
             seen = float(found.problem.ratio(name).mean[place])
             value, low, high = (float(column[place]) for column in found.predicted[name])
             row += [_short(number) for number in (seen, value, low, high, seen / value - 1.0)]
-        friction = found.friction[place] if found.friction else None
-        row += [
-            _short(number) for number in ((friction.value, friction.low, friction.high) if friction else (np.nan,) * 3)
-        ]
+        friction = found.friction[place] if found.friction else Estimate(nan)
+        row += [_short(number) for number in (friction.value, friction.low, friction.high)]
         table.writerow(row)
     return stream.getvalue()
 

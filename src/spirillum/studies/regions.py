@@ -244,10 +244,8 @@ class Pace:
         self._regions = self._done = self._before = 0
 
     def seconds(self, robots: int) -> float | None:
-        """Take note of a region that is done, and return the time from begin to end, s; None: not known yet.
-
-        The first region of every process is left out of the pace: before it, the process loads what it needs.
-        """
+        """Take note of a region that is done, and return the time from begin to end, s; None: not known yet."""
+        # The first region of every process is left out of the pace: before it, the process loads what it needs.
         now = self._clock()
         self._regions, self._done = self._regions + 1, self._done + robots
         if self._regions == self._workers:

@@ -51,10 +51,8 @@ Levels = np.ndarray[tuple[int, ...], np.dtype[np.intp]]  #: Levels of factors, (
 
 
 def half_fraction(factors: int) -> Levels:
-    """Half of all combinations of levels -1 and +1, the last factor's the product of the others', (runs, factors).
-
-    Every column adds up to 0, and any two are orthogonal from three factors on.
-    """
+    """Half of all combinations of levels -1 and +1, the last factor's the product of the others', (runs, factors)."""
+    # Every column adds up to 0, and any two are orthogonal from three factors on.
     free = np.array(list(product((-1, 1), repeat=factors - 1)), dtype=np.intp)
     return np.concatenate([free, np.prod(free, axis=1, keepdims=True)], axis=1)
 
@@ -126,10 +124,8 @@ class ReleaseTask(OneRobot):
     followed = "runs after release"
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
-        """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`.
-
-        NaN for a run that its robot cannot make, and over a window that it does not reach.
-        """
+        """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`."""
+        # NaN for a run that its robot cannot make, and over a window that it does not reach.
         runs = release_runs(self.robot, self.ranges)
         read = [self._read(released) for released in runs]
         part: Part = {
@@ -193,12 +189,10 @@ def _observe(run: xr.Dataset, begin: float, end: float) -> dict[str, float]:
 
 
 def inferred(robot: Robot, seen: Part) -> Part:
-    """What the paper's models make of observed rates, (..., models).
-
-    B_eff follows from (18) with the hydrodynamic torque of the model at the observed rates of tail and motor, as the
-    paper infers it; speed and body rate are the model's at the observed tail rate. The factor on the drag of the
-    isolated body is that with which the axial balance (15) gives the observed speed at the observed tail rate.
-    """
+    """What the paper's models make of observed rates, (..., models)."""
+    # B_eff follows from (18) with the hydrodynamic torque of the model at the observed rates of tail and motor, as the
+    # paper infers it; speed and body rate are the model's at the observed tail rate. The factor on the drag of the
+    # isolated body is that with which the axial balance (15) gives the observed speed at the observed tail rate.
     tail, motor = (seen[name].ravel() for name in ("tail_rotation_rate", "motor_rotation_rate"))
     speed = seen["forward_velocity"].ravel()
     batch = RobotBatch.of(robot).with_values({"tail.wavelength": np.full(tail.size, robot.tail.wavelength)})

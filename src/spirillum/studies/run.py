@@ -24,7 +24,6 @@ from spirillum.notes import Note
 from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
-from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.columns import (
     BandTask,
@@ -66,10 +65,8 @@ def stored_answer(number: int, task: StudyTask, folder: Path | None, leading: tu
         return None
     try:
         with opened(folder / _PART.format(number), "a part of a study", _LARGEST_PART) as stream:
-            if any(
-                not (item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size)
-                for item in zipfile.ZipFile(stream).infolist()
-            ):
+            items = zipfile.ZipFile(stream).infolist()
+            if any((item.compress_type, item.compress_size) != (zipfile.ZIP_STORED, item.file_size) for item in items):
                 return None
             with np.load(stream, allow_pickle=False) as stored:
                 part = {name: stored[name] for name in stored.files if name != _MARK}
@@ -273,12 +270,8 @@ def make_tables(loaded: LoadedStudy, pool: WorkerPool, progress: Progress) -> No
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
         holds = "for release" if stage == "yaw" else "for fixed poses"
-        tell(
-            progress,
-            f"{ANNOUNCED}, of {len(missing)} robots: they are made first, {holds} (stage {stage}); {cheaper}",
-            0,
-            0,
-        )
+        what = f"{ANNOUNCED}, of {len(missing)} robots: they are made first, {holds} (stage {stage}); {cheaper}"
+        tell(progress, what, 0, 0)
         prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=progress)
 
 
@@ -287,24 +280,16 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
     found: dict[str, list[Robot]] = {}
     for index in range(loaded.count):
         if index not in with_table:
-            robot = loaded.robot_at(index)
-            why = _why_without_table(robot, loaded.placement_at(index))
+            robot, why = loaded.robot_at(index), "without-yawed-table"
+            if robot.channel is None:
+                why = "without-channel"
+            elif broken(requirements(RobotBatch.of(robot, loaded.placement_at(index)), TabledTube({}))):
+                why = "without-room"
             found.setdefault(why, []).append(robot)
     return [
-        Note(
-            "without-answer", f"{len(robots)} of {loaded.count} robots {why.format(robots[0].with_tail)}", ("settled",)
-        )
+        Note.named(why, count=len(robots), robots=loaded.count, first=robots[0].with_tail)
         for why, robots in found.items()
     ]
-
-
-def _why_without_table(robot: Robot, placement: Placement) -> str:
-    """What robots that are not released lack; a placeholder for the name of the first."""
-    if robot.channel is None:
-        return "have no channel for a release, the first: {}"
-    if broken(requirements(RobotBatch.of(robot, placement), TabledTube({}))):
-        return "do not fit at the initial pose and were not released, the first: {}"
-    return "have no table with yawed poses and were not released, the first: {}; `spirillum prepare` makes one"
 
 
 _NAMED = 3  # robots that a sentence names; more are counted

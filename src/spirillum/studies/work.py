@@ -276,17 +276,12 @@ def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:
         tails = {"tail.wavelength": wavelength, "tail.amplitude": amplitude}
         if loaded.friction:
             every = range(index * wavelength.size, (index + 1) * wavelength.size)
-            tails["friction.effective"] = np.array([_friction_at(loaded, tail) for tail in every])
+            fitted = [loaded.with_friction(loaded.robot_at(tail)).friction.effective for tail in every]
+            tails["friction.effective"] = np.array(fitted, dtype=float)  # NaN where unset
         yield (
             index * wavelength.size + np.arange(wavelength.size),
             RobotBatch.of(robot, loaded.placement_of(index)).with_values(tails),
         )
-
-
-def _friction_at(loaded: LoadedStudy, index: int) -> float:
-    """B_eff of a robot: that which was fitted to its tail, else its own; NaN where unset."""
-    own = loaded.with_friction(loaded.robot_at(index)).friction.effective
-    return float("nan") if own is None else own
 
 
 def quick_parts(batch: RobotBatch, name: str) -> QuickParts:

@@ -11,7 +11,7 @@ from spirillum.dynamics.prediction import predict
 from spirillum.envelope import quantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, with_numbers
 from spirillum.swimming.prediction import Prediction
 
 
@@ -35,14 +35,9 @@ _REMARK = (
 
 def other_tube(found: Prediction, released: Mapping[str, Any] | None = None) -> Prediction | None:
     """Return the same robot in the paper's other tube; None for a request of which the paper states no numbers."""
-    if (
-        not found.released
-        or found.model.name != "tube"
-        or found.tail_rate is not None
-        or found.batch.placement != RobotBatch.of(found.robot).placement
-        or found.fitted_by
-        or not _drops(found.robot)
-    ):
+    plain = found.tail_rate is None and not found.fitted_by
+    at_rest = found.batch.placement == RobotBatch.of(found.robot).placement
+    if not (found.released and found.model.name == "tube" and plain and at_rest and _drops(found.robot)):
         return None
     for own, other in ((_WIDE, _NARROW), (_NARROW, _WIDE)):
         if found.robot == _with_tail_of(found.robot, own) and found.friction == found.robot.friction.reading:
@@ -52,11 +47,9 @@ def other_tube(found: Prediction, released: Mapping[str, Any] | None = None) -> 
 
 
 def published_values(found: Prediction, beside: Prediction | None) -> list[dict[str, Any]]:
-    """Return what the paper states of this robot, with our held and trial values; empty for any other request.
-
-    The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide
-    one, with two of its tails.
-    """
+    """Return what the paper states of this robot, with our held and trial values; empty for any other request."""
+    # The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide
+    # one, with two of its tails.
     if beside is None:
         return []
     sign = 1.0 if found.robot == _with_tail_of(found.robot, _WIDE) else -1.0
@@ -65,9 +58,9 @@ def published_values(found: Prediction, beside: Prediction | None) -> list[dict[
 
 def _with_tail_of(robot: Robot, preset: str) -> Robot:
     """A preset with the tail of a robot."""
-    paper = load(preset)
-    changed = {"wavelength": robot.tail.wavelength, "amplitude": robot.tail.amplitude}
-    return paper.model_copy(update={"tail": paper.tail.model_copy(update=changed)})
+    return with_numbers(
+        load(preset), {f"tail.{name}": getattr(robot.tail, name) for name in ("wavelength", "amplitude")}
+    )
 
 
 def _drops(robot: Robot) -> list[float]:

@@ -30,11 +30,9 @@ def paper_run(prediction: Prediction, timing: Timing | None = None) -> xr.Datase
 
 
 def adams_states(robot: AxialRobot, time: Samples, duty: Samples) -> Samples:
-    """States from rest, (n, 7), at times, s, by variable-order Adams-Moulton predictor-corrector steps (VODE).
-
-    Time counts from each switching, which (17) does not depend on: VODE refuses a step that is no longer than the
-    rounding error of its end.
-    """
+    """States from rest, (n, 7), at times, s, by variable-order Adams-Moulton predictor-corrector steps (VODE)."""
+    # Time counts from each switching, which (17) does not depend on: VODE refuses a step that is no longer than the
+    # rounding error of its end.
     states, begin = np.zeros((time.size, 7)), 0
     while begin < time.size - 1:
         changes = np.flatnonzero(duty[begin + 1 :] != duty[begin + 1])
