@@ -8,7 +8,7 @@ between them almost like a solid cylinder: the second nearly doubles the torque 
 import numpy as np
 
 from spirillum.fluid.wire.interaction import Discretisation, solve
-from spirillum.fluid.wire.stokeslets import wire_along
+from spirillum.fluid.wire.stokeslets import stations_along
 from spirillum.robot.outline import body_outline
 
 BODY, ROTOR = 0, 1
@@ -27,7 +27,7 @@ def tail(phase: float) -> np.ndarray:
 
 def matrix(curves: list[np.ndarray]) -> np.ndarray:
     """12x12 resistance of body and rotor, SI."""
-    wires = [(wire_along(curve, 0.5e-3), ROTOR) for curve in curves]
+    wires = [(stations_along(curve, 0.5e-3), ROTOR) for curve in curves]
     return VISCOSITY * solve([(body, BODY)], wires, Discretisation(wire="high")).matrix
 
 

@@ -50,7 +50,8 @@ def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.Mo
     from spirillum.fitted import posterior_file
 
     known = posterior_file.read_posterior(fitted / "posterior.nc")
-    certain = replace(known, draws={name: np.full_like(values, 1.5) for name, values in known.draws.items()})
+    drawn = {name: np.full_like(values, 1.5) for name, values in known.draws.items()}
+    certain = known.model_copy(update={"draws": drawn})
     monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, *, answer: certain)
     found = sp.suggest(fitted / "posterior.nc", WIDE, candidates=candidates(fitted, "40,20,2.5"))
     assert found.candidates[0].gain == pytest.approx(0.0, abs=1e-9)
@@ -70,12 +71,12 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
     drawn = middle * np.exp(spread * rng.normal(size=(40_000, 2)))
     draws = {"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]}
     one = np.ones(40_000)
-    known = replace(
-        posterior_file.read_posterior(fitted / "posterior.nc"),
-        draws=draws,
-        discrepancy={"advance": tau * one, "turning": tau * one},
-        error={"advance": sigma * one, "turning": sigma * one},
-    )
+    changed = {
+        "draws": draws,
+        "discrepancy": {"advance": tau * one, "turning": tau * one},
+        "error": {"advance": sigma * one, "turning": sigma * one},
+    }
+    known = posterior_file.read_posterior(fitted / "posterior.nc").model_copy(update=changed)
     monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, *, answer: known)
     found = sp.suggest("any", WIDE, candidates=candidates(fitted, "40,20,2.5"), trials=trials).candidates[0]
 
@@ -126,12 +127,12 @@ def test_candidates_that_the_draws_do_not_tell_apart_are_a_tie(
     behind, errors = [], []
     for seed in range(40):
         drawn = np.array([2.5, 0.8]) * np.exp(np.array([0.1, 0.1]) * np.random.default_rng(seed).normal(size=(400, 2)))
-        drawn_anew = replace(
-            known,
-            draws={"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]},
-            discrepancy={"advance": 0.01 * one, "turning": 0.01 * one},
-            error={"advance": 0.02 * one, "turning": 0.02 * one},
-        )
+        changed = {
+            "draws": {"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]},
+            "discrepancy": {"advance": 0.01 * one, "turning": 0.01 * one},
+            "error": {"advance": 0.02 * one, "turning": 0.02 * one},
+        }
+        drawn_anew = known.model_copy(update=changed)
         monkeypatch.setattr(
             "spirillum.calibration.suggest.read_posterior", lambda _path, *, answer, new=drawn_anew: new
         )
@@ -237,7 +238,7 @@ def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatc
     assert len(found.candidates) == 2
     assert "biorob2012-wide and biorob2012-narrow, are used" in found.warnings[0]
     known = posterior_file.read_posterior(fitted / "posterior.nc")
-    for changed in (replace(known, channels=(0.024,)), replace(known, body=(0.016, 0.035))):
+    for changed in (known.model_copy(update=new) for new in ({"channels": (0.024,)}, {"body": (0.016, 0.035)})):
         monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, *, answer, one=changed: one)
         with pytest.raises(InputError, match="allowed: ROBOT, one for each channel"):
             sp.suggest("any")

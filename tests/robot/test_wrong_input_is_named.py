@@ -58,9 +58,9 @@ FIELDS: list[tuple[dict[str, Any], str, str]] = [
     ({"drive.duty": True}, "drive.duty = True", "number"),
     ({"calibration.sbt.body_drag": 0.0}, "calibration.sbt.body_drag = 0.0", "0.001"),
     ({"calibration.sbt.body_drag": HUGE}, "calibration.sbt.body_drag = ", "allowed: "),
-    ({"calibration.sbt.source": ""}, "calibration.sbt.source = ''", "at least 1 character"),
-    ({"name": 5}, "name = 5", "string"),
-    ({"name": ""}, "name = ''", "at least 1 character"),
+    ({"calibration.sbt.source": ""}, "calibration.sbt.source = ''", "text that is not empty"),
+    ({"name": 5}, "name = 5", "text in quotes"),
+    ({"name": ""}, "name = ''", "text that is not empty"),
     ({"name": "x" * 300}, "name = 'xxx", "at most 200 characters"),
     ({"model.rft.spin": "yes"}, "model.rft.spin = 'yes'", "true or false"),
     # words
