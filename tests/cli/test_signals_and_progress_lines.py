@@ -82,7 +82,7 @@ def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: b
         assert [
             line for line in before if not line.startswith(("no table of this tube yet", "poses of the table: "))
         ] == []
-        places = re.search(r"from (\d+) poses", before[0])
+        places = re.search(r"from (\d+) poses", said)
         assert places is not None
         assert re.search(rf"\d+ of {places[1]} poses are saved; the same command resumes the computation$", last)
 
