@@ -121,7 +121,8 @@ class BodyFinder:
         found: list[PoseFit] = []
         if self.seal is not None:  # what does not move along with the seal is not the body's
             found = self._learn_seal(parts, poses)
-            poses = _smooth([new.pose if new.known else old for new, old in zip(found, poses, strict=True)], times)
+            poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
+            poses = _smooth(poses, times, SEAL.beside_path)
         for turn in range(OUTLINE.learning_rounds if self.seal is None else SEAL.joint_rounds):
             stack = [self._profiles(part, pose) for part, pose in zip(parts, poses, strict=True)]
             self._learn_profiles(np.stack(stack))
@@ -414,12 +415,14 @@ def grey_of(colours: np.ndarray) -> np.ndarray:
     return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY))[..., None]
 
 
-def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:
+def _smooth(
+    poses: list[BodyPose], times: Samples, least: tuple[float, float, float] = (1e-3, 5e-4, 0.01)
+) -> list[BodyPose]:
     """Poses with outliers replaced by the Theil-Sen line of each coordinate."""
     if len(poses) < 4:
         return poses
     numbers = np.array(poses)
     line = theil_sen_line(times, numbers).at(times[:, None])
     off = np.abs(numbers - line)
-    bound = np.maximum(3.0 * np.median(off, axis=0), np.array([1e-3, 5e-4, 0.01]))
+    bound = np.maximum(3.0 * np.median(off, axis=0), least)
     return [BodyPose(*row) for row in np.where(off > bound, line, numbers).tolist()]

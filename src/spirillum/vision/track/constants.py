@@ -84,6 +84,9 @@ class SealConstants:
     """Share of the edges of the nose, which give the robot's displacement, that have to move with the seal, too."""
     apart: float = 0.3
     """Standard deviation between places by the outline alone and by the seal from which on they disagree, pixels."""
+    beside_path: tuple[float, float, float] = (2e-3, 5e-4, 0.1)
+    """Distances from the robot's path, along and across, m, and heading, rad, from which on a pose took something else,
+    such as a stripe, for the seal's side."""
     moves: int = 1  #: Times that its edges are learnt again where the outline lies.
     far_enough: float = 4.0
     """Displacement of the robot from which on what moves is distinguished from what stands still, pixels."""
