@@ -60,6 +60,15 @@ def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
         raise InputError(f"{name} = {word!r}{did_you_mean(word, allowed, 0.6)}; allowed: {', '.join(allowed)}")
 
 
+def check_names(prefix: str, names: Iterable[object], allowed: Collection[str], what: str = "a known field") -> None:
+    """Refuse the first of some names that is none of the allowed ones, with the nearest of them."""
+    for name in names:
+        if name not in allowed:
+            word = str(name)[:60]
+            hint = did_you_mean(word, allowed)
+            raise InputError(f"{prefix}.{word} is not {what}{hint}; allowed: {', '.join(allowed)}")
+
+
 def clipped(value: object, longest: int = 60) -> str:
     """A value as Python writes it, truncated; an integer too long to write is described."""
     try:

@@ -38,7 +38,7 @@ from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.release import reach_of
 from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, check_choice, check_memory, check_range, did_you_mean
+from spirillum.errors import InputError, check_choice, check_memory, check_names, check_range
 from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
 from spirillum.progress import Progress, tell
@@ -330,18 +330,13 @@ def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
 
 
 def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapping[str, Any]) -> None:
-    if controller not in CONTROLLERS:
-        hint = did_you_mean(controller, CONTROLLERS)
-        raise InputError(f"controller = {controller[:60]!r}{hint}; allowed: {', '.join(CONTROLLERS)}")
+    check_choice("controller", controller, CONTROLLERS)
     check_range("seeds", seeds, 0, _MOST_SEEDS)
     check_range("seed", seed, 0, _LAST_SEED - seeds)
     check_range("workers", workers, 1, 256)
     if workers > 1 and not seeds:
         raise InputError(f"workers = {workers} without seeds, whose runs they share; allowed: 1, or seeds from 1")
-    for name in arguments:
-        if name not in _ALLOWED:
-            hint = did_you_mean(str(name)[:60], _ALLOWED)
-            raise InputError(f"plant.{str(name)[:60]} is not known{hint}; allowed: {', '.join(_ALLOWED)}")
+    check_names("plant", arguments, _ALLOWED, "known")
 
 
 def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:

@@ -77,10 +77,8 @@ class Bank:
         factors = [float(unknown.friction_factor**u) for u in self.friction]
         members = [SampledErrors(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]
         for factor in factors:
-            members += [
-                SampledErrors(factor, 1.0, None, 1.0 + _CHANGE),
-                SampledErrors(factor, 1.0, None, 1.0, 1.0 + _CHANGE),
-            ]
+            members += [SampledErrors(factor, 1.0, voltage=1.0 + _CHANGE)]
+            members += [SampledErrors(factor, 1.0, viscosity=1.0 + _CHANGE)]
         self._plants: list[Plant] = []
         for member in members:
             self._plants.append(plant_of(robot, arguments or {}, member))

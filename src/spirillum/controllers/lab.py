@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BeforeValidator
 
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_names
 from spirillum.files import read_toml
 from spirillum.robot.arguments import Options, in_range, refusal, within
 from spirillum.robot.fields import Angle, Current, LengthOrZero, Section, Time, Velocity
@@ -143,10 +143,7 @@ class Lab(Section):
             for name, info in cls.model_fields.items()
             if isinstance(info.annotation, type) and issubclass(info.annotation, Options)
         }
-        for name in table:
-            if name not in sections:
-                hint = did_you_mean(str(name)[:60], sections)
-                raise InputError(f"lab.{str(name)[:60]} is not a known table{hint}; allowed: {', '.join(sections)}")
+        check_names("lab", table, sections, "a known table")
         read = {name: section.as_written if written else section.of for name, section in sections.items()}
         return cls(**{name: reader(table.get(name)) for name, reader in read.items()})
 

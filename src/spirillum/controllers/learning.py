@@ -266,9 +266,6 @@ def _factor(axis: Samples, weight: Samples, largest: float) -> Factor:
     )
 
 
-_NAMES = ("friction", "gap")
-
-
 class Learner:
     """What has been seen of a run, and the factors estimated from it."""
 
@@ -344,7 +341,7 @@ class Learning(Controller):
     def estimate(self) -> Mapping[str, float]:
         """The controller's, and median and 95 % interval of the factors of friction and gap; NaN before."""
         estimate: dict[str, Any] = dict(self._controller.estimate())
-        for name in _NAMES:
+        for name in ("friction", "gap"):
             factor = None if self.learner.learnt is None else getattr(self.learner.learnt, name)
             for end, part in (("", "value"), ("_low", "low"), ("_high", "high")):
                 estimate[f"estimated_{name}_factor{end}"] = np.nan if factor is None else float(getattr(factor, part))

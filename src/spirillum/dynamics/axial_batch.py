@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.argument_validation import as_number, as_step, check_kind, validate_arguments
 from spirillum.arrays import Samples
 from spirillum.dynamics.axial_robot import PARAMETERS, STATES, AxialRobot, axial_robot, motion, responses
-from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.errors import InputError, check_names, clipped
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.kernels import core
 from spirillum.notes import Note
@@ -37,12 +37,8 @@ def checked_ranges(axial: AxialRobot, ranges: Mapping[str, Any] | None) -> dict[
     robot = axial.robot
     allowed = [*FACTORS, *(item.name for item in axial.parameters if item.name not in _FIXED)]
     found = {}
+    check_names("ranges", ranges or {}, allowed, "a number that can be sampled")
     for name, given in (ranges or {}).items():
-        if name not in allowed:
-            raise InputError(
-                f"ranges.{str(name)[:60]} is not a number that can be sampled{did_you_mean(str(name)[:60], allowed)}; "
-                f"allowed: {', '.join(allowed)}"
-            )
         pair = list(given) if isinstance(given, (tuple, list)) else []
         numbers = len(pair) == 2 and all(np.isfinite(as_number(item)) for item in pair)
         if not numbers or pair[0] > pair[1]:

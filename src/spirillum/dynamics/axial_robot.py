@@ -42,7 +42,6 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.drives import packed_curve, winding_resistance
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.reynolds import (
     body_reynolds,
     check_stokes_flow,
@@ -188,24 +187,14 @@ class AxialRobot:
 def axial_robot(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    model: str = AUTO,
-    friction: str | None = None,
-    calibrated: bool = True,
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
+    **asked: Any,
 ) -> AxialRobot:
     """A robot in axial motion, as in a held run of `simulate`; arguments as of `predict`, a `flow` is an input."""
     placed = Placement.of(placement)
-    steady = predict(
-        robot,
-        model=model,
-        friction=friction,
-        calibrated=calibrated,
-        fit=read_fit(calibration),
-        placement=placed if placed.is_set else None,
-        band=False,
-    )
-    return AxialRobot.of(steady)
+    pose = placed if placed.is_set else None
+    return AxialRobot.of(predict(robot, fit=read_fit(calibration), placement=pose, band=False, **asked))
 
 
 def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:

@@ -7,7 +7,6 @@ that of the posterior's median lies, by Newton's method over a turn of the tail.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_motion import STABLE, FreeMotion, means_over, prepare_release
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
 from spirillum.errors import InputError
-from spirillum.fitted.fit import CALIBRATED_HELD, Fit
+from spirillum.fitted.fit import Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes, notes_in
@@ -28,7 +27,7 @@ from spirillum.swimming.intervals import intervals_over, sampled_batch
 from spirillum.swimming.preparation import ModelChoice, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import PosteriorFor, sampled_discrepancy
-from spirillum.swimming.steady import LEVEL, Intervals, Swimming
+from spirillum.swimming.steady import LEVEL, Intervals, Swimming, one_after_another
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +65,7 @@ def chosen_run(
         notes.append(Note.named("axial-run", model=choice.model, why=why))
         return choice, "held", notes
     if motion != "held" and chosen.placed and fit.posterior is None and not fit.of_trials:
-        notes.append(CALIBRATED_HELD)
+        notes.append(Note.named("calibration-of-held"))
     return choice, motion or "free", notes
 
 
@@ -174,11 +173,10 @@ def intervals_of_free_motion(
             f"posterior with motion 'free': {lost} of {len(indices)} draws reach no steady motion near that "
             "of the median; allowed: motion 'held', or `simulate` with the posterior"
         )
-    names = [item.name for item in fields(Swimming)]
-    whole = Swimming(**{name: np.concatenate([getattr(one, name) for one in swum]) for name in names})
     kept = posterior.at(steady)
     batch = sampled_batch(robot, kept.model, kept.of(robot, rng), kept.count)
     own_drive = found.prediction.tail_rate is None
+    whole = one_after_another(swum)
     return intervals_over(
         whole, batch, kept, robot, rng, own_drive=own_drive, friction=reading, posterior_for=posterior_for
     )

@@ -106,11 +106,9 @@ def series_of(prediction: Prediction, links: FreeRobot, run: Trajectory) -> dict
         field = 0.5 * np.pi + _field_angle(links, run)
         behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
         behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
-        behind = np.where(run.duty > 0, behind, np.nan)
-        found |= {
-            "phase_lag": behind,
-            "wobble_angle": np.arccos(np.clip(np.abs(_in_field(links, rotation[:, :, 0])[:, 0]), 0.0, 1.0)),
-        }
+        found["phase_lag"] = np.where(run.duty > 0, behind, np.nan)
+        along = np.abs(_in_field(links, rotation[:, :, 0])[:, 0])
+        found["wobble_angle"] = np.arccos(np.clip(along, 0.0, 1.0))
     return found
 
 

@@ -26,10 +26,10 @@ from spirillum.dynamics.run_summary import is_held, state_of
 from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
-from spirillum.fitted.fit import FITTED_BESIDE, NO_FIT, Fit
+from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.kernels.native import thread_count
-from spirillum.notes import notes_in
+from spirillum.notes import Note, notes_in
 from spirillum.progress import Progress, tell
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
@@ -63,7 +63,7 @@ _MANY_POSES = "they follow from the body's drag at one pose, and a trial passes 
 _MOST_TURNS = 2000  # Turns of the tail that a trial may take beside an answer.
 
 
-def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, placement: Placement) -> str:
+def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, batch: RobotBatch) -> str:
     """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
     if robot.channel is None:
         return "the robot has no channel in which it could be released"
@@ -71,7 +71,6 @@ def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, pl
         return f"model '{model}' has no walls on which a robot could rest; use model '{WALLED}'"
     if tail_rate is not None:
         return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
-    batch = RobotBatch.of(robot, placement)
     if has_table(batch, "yaw"):
         return ""
     return why_no_table(batch) or (
@@ -317,7 +316,7 @@ class TrialRequest:
         if self._given:
             robot = self.fit.central(self.robot)
             placed = self.fit.placed(robot, Placement.of(self.placement))
-            reason = why_not_released(robot, model, tail_rate, placed)
+            reason = why_not_released(robot, model, tail_rate, RobotBatch.of(robot, placed))
             if not wanted or reason:
                 self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
@@ -350,7 +349,7 @@ class TrialRequest:
 
     def add_released_motions(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none."""
-        reason = why_not_released(held.robot, held.model.name, held.tail_rate, held.batch.placement)
+        reason = why_not_released(held.robot, held.model.name, held.tail_rate, held.batch)
         if reason:
             self._check_unused(reason)
         if not wanted:
@@ -360,7 +359,7 @@ class TrialRequest:
         self._check_length(held)
         self._announce("held", held.forward_velocity, held.tail_rotation_rate)
         other = held.fitted_by and self.fit.fitted_motion == HELD
-        notes = (*held.warnings, FITTED_BESIDE) if other else held.warnings
+        notes = (*held.warnings, Note.named("fit-beside-trial")) if other else held.warnings
         return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady}, warnings=notes)
 
     def trial(self, held: Prediction) -> ReleasedMotion:

@@ -185,10 +185,7 @@ def _sites(robot: Robot) -> tuple[list[str], Samples]:
     if coupling.length > 0 and solid > 0:
         front = -half - coupling.clearance
         names += ["coupling front", "coupling rear"]
-        rows += [
-            (front, 0.5 * coupling.diameter, 0.0, 0.0, 1.0),
-            (front - solid, 0.5 * coupling.diameter, 0.0, 0.0, 1.0),
-        ]
+        rows += [(x, 0.5 * coupling.diameter, 0.0, 0.0, 1.0) for x in (front, front - solid)]
     return names, np.array(rows)
 
 

@@ -240,18 +240,8 @@ def _motion(dataset: xr.Dataset, poses: Poses) -> Iterator[Message]:
             (_LAB, _BODY, position, attitude),
             (_BODY, _ROTOR, np.zeros(3), rolled(float(poses.tail_phase[n]))),
         ):
-            yield (
-                "/tf",
-                _TRANSFORM,
-                time,
-                {
-                    "timestamp": when,
-                    "parent_frame_id": parent,
-                    "child_frame_id": child,
-                    "translation": place(where),
-                    "rotation": turn(turned),
-                },
-            )
+            frames = {"timestamp": when, "parent_frame_id": parent, "child_frame_id": child}
+            yield "/tf", _TRANSFORM, time, {**frames, "translation": place(where), "rotation": turn(turned)}
         pose = pose_of(position, attitude)
         yield "/pose", _POSE_IN_FRAME, time, {"timestamp": when, "frame_id": _LAB, "pose": pose}
         known = {name: float(values[n]) for name, values in columns.items() if np.isfinite(values[n])}
@@ -298,19 +288,8 @@ def _events(dataset: xr.Dataset) -> Iterator[Message]:
     for time, what in sorted(entries):
         if -wait <= time < 0.0:
             time, what = 0.0, f"{what} ({-time:.4g} s before)"  # noqa: PLW2901
-        yield (
-            "/events",
-            _LOG,
-            time,
-            {
-                "timestamp": stamp(time),
-                "level": _INFORMATION,
-                "message": what,
-                "name": "spirillum",
-                "file": "",
-                "line": 0,
-            },
-        )
+        entry = {"timestamp": stamp(time), "level": _INFORMATION, "message": what}
+        yield "/events", _LOG, time, {**entry, "name": "spirillum", "file": "", "line": 0}
 
 
 def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[Message]:
@@ -323,14 +302,5 @@ def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[
             break
         encoded = io.BytesIO()
         pictures.fromarray(frame.image).save(encoded, "JPEG", quality=_QUALITY)
-        yield (
-            "/film",
-            _IMAGE,
-            time,
-            {
-                "timestamp": stamp(time),
-                "frame_id": "camera",
-                "data": base64.b64encode(encoded.getvalue()).decode(),
-                "format": "jpeg",
-            },
-        )
+        picture = {"data": base64.b64encode(encoded.getvalue()).decode(), "format": "jpeg"}
+        yield "/film", _IMAGE, time, {"timestamp": stamp(time), "frame_id": "camera", **picture}

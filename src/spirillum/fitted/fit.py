@@ -31,9 +31,6 @@ _COEFFICIENTS = ("normal_factor", "tangential_factor")  # fitted fields that act
 
 FITTED_HELD = Note.named("posterior-of-held")  #: Caution of a free motion in the tube with a posterior.
 FITTED_TRIAL = Note.named("posterior-of-trials")  #: Caution of a held answer with a posterior of trials.
-FITTED_BESIDE = Note.named("fit-beside-trial")
-"""Caution of a trial beside a held answer with a fit of held robots: it may be many times slower."""
-CALIBRATED_HELD = Note.named("calibration-of-held")  #: Caution of a free motion in the tube with a calibration file.
 
 
 @dataclass(frozen=True)

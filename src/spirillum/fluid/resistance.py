@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, check_choice, did_you_mean
+from spirillum.errors import InputError, check_choice
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
 from spirillum.fluid.registry import check_placement, find_model
@@ -117,9 +117,7 @@ def resistance(
     ready = with_resolution(ready, _with_accuracy(resolution, accuracy), model)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
-    if part not in (*PARTS, _BOTH):
-        allowed = (*PARTS, _BOTH)
-        raise InputError(f"part = {part!r}{did_you_mean(str(part), allowed)}; allowed: {', '.join(allowed)}")
+    check_choice("part", part, (*PARTS, _BOTH))
     known = (*chosen.parts, _BOTH) if isinstance(chosen, SwimmerModel) else chosen.parts
     if part not in known:
         raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(known)}")

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 from pydantic import AfterValidator, BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.errors import InputError, check_names, clipped
 from spirillum.robot.fields import Section, field_values, problems_in, refused_table
 from spirillum.scalars import is_number, is_whole
 from spirillum.units import float_note
@@ -42,11 +42,7 @@ class Options(Section):
             allowed = ", ".join(cls.model_fields)
             words = clipped(value) if isinstance(value, int) else repr(str(value)[:60])
             raise InputError(f"{cls.argument} = {words}; allowed: {allowed}, each by name")
-        for name in value or {}:
-            if name not in cls.model_fields:
-                hint = did_you_mean(str(name)[:60], cls.model_fields)
-                allowed = ", ".join(cls.model_fields)
-                raise InputError(f"{cls.argument}.{str(name)[:60]} is not a known field{hint}; allowed: {allowed}")
+        check_names(cls.argument, value or {}, cls.model_fields)
         units = {} if written else {item.path: item.unit for item in field_values(cls.model_construct())}
         given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
         checked = problems_in(cls, given, cls.argument if cls.prefixed else "")

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.data_tables import rows_of
 from spirillum.errors import InputError, check_memory
@@ -95,11 +96,7 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
     20. The seal's first stripe is centred on +z; the next ones follow in the positive sense about +x, from +z towards
     -y.
     """
-    try:
-        number = float(fineness)
-    except (TypeError, ValueError):
-        number = float("nan")
-    if not _FINENESS[0] <= number <= _FINENESS[1]:
+    if not _FINENESS[0] <= as_number(fineness) <= _FINENESS[1]:
         raise InputError(f"fineness = {fineness!r}; allowed: {_FINENESS[0]} to {_FINENESS[1]}")
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
     outlines = outlines_of(robot)

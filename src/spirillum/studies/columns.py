@@ -25,10 +25,10 @@ from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, flag_attributes, gathered, groups
-from spirillum.swimming.band import at_pose, band_poses, joined
+from spirillum.swimming.band import at_pose, band_poses
 from spirillum.swimming.preparation import WALLED, has_table
 from spirillum.swimming.released_motion import ASSUMPTION
-from spirillum.swimming.steady import requirements, swim
+from spirillum.swimming.steady import one_after_another, requirements, swim
 from spirillum.units import show
 
 AT_POSES = (
@@ -70,7 +70,9 @@ class BandTask(OneModel):
         quick = [(robot, quickest(model, robot)) for robot in self.robots]
         # From its table, or solved with the resolution of a band.
         there = [(at_pose(one, one.placement), model) if form is model else (one, form) for one, form in quick]
-        found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
+        found = [
+            one_after_another([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction
+        ]
         return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_POSES}
 
 

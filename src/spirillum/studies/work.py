@@ -23,9 +23,8 @@ from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays, observed_at
-from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
-from spirillum.swimming.steady import STEADY, Swimming, requirements, speed_error, swim
+from spirillum.swimming.steady import STEADY, Swimming, one_after_another, requirements, speed_error, swim
 
 MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
 """Quantities of every motion."""
@@ -303,7 +302,7 @@ def _swum(
     for cut, batch, model in quick:
         tail, motor = (None if rate is None else rate[cut] for rate in (tail_rate, motor_rate))
         found.append(swim(batch, model, tail_rate=tail, motor_rate=motor, friction=reading))
-    return joined(found)
+    return one_after_another(found)
 
 
 def _speed_errors(quick: QuickParts, reading: str, found: Swimming) -> PerRobot:

@@ -14,7 +14,7 @@ not resolved.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -23,7 +23,7 @@ import numpy as np
 from spirillum.arrays import PerRobot
 from spirillum.envelope import quantity
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.domain import WIRE_FILM
+from spirillum.fluid.tube.domain import WIRE_FILM, in_tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
@@ -32,7 +32,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
-from spirillum.swimming.steady import STEADY, Swimming, requirements
+from spirillum.swimming.steady import STEADY, Swimming, one_after_another, requirements
 from spirillum.units import show
 
 PLACES_PER_FIELD = 3  #: Gaps, and pitches at each of them.
@@ -79,9 +79,8 @@ class Band:
 
     def to_dict(self) -> dict[str, Any]:
         """All poses with their answers, as quantities whose values are lists."""
-        units = {item.name: item.unit for item in STEADY}
         found = {"gap": quantity(self.gap, "m"), "pitch": quantity(self.pitch, "rad")}
-        return found | {name: quantity(getattr(self.swimming, name), unit) for name, unit in units.items()}
+        return found | {item.name: quantity(getattr(self.swimming, item.name), item.unit) for item in STEADY}
 
 
 def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
@@ -97,7 +96,7 @@ def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     over = left_open(batch.pose, model)
     if not over:
         return []
-    g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
+    g, radius = in_tube(batch)
     known = batch.placement
     gaps = [known.gap]
     if "gap" in over:
@@ -107,9 +106,9 @@ def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     places = []
     for gap in gaps:
         assert gap is not None  # noqa: S101 - either open or given
-        alike = g._replace(wavelength=1.0, hand=1.0)
-        steepest = _steepest(alike, radius, gap, known.tail_drop, known.yaw) if "pitch" in over else 0.0
-        pitches = np.linspace(0.0, steepest, PLACES_PER_FIELD).tolist() if "pitch" in over else [known.pitch]
+        pitches = [known.pitch]
+        if "pitch" in over:
+            pitches = np.linspace(0.0, steepest_pitch(batch, gap), PLACES_PER_FIELD).tolist()
         places += [known.model_copy(update={"gap": gap, "pitch": pitch}) for pitch in pitches]
     return places
 
@@ -135,7 +134,7 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: flo
 
 def steepest_pitch(batch: RobotBatch, gap: float) -> float:
     """Steepest pitch, nose up, that a gap and the tail allow, rad; 0 where even a level robot has no room."""
-    g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
+    g, radius = in_tube(batch)
     known = batch.placement
     return _steepest(g._replace(wavelength=1.0, hand=1.0), radius, gap, known.tail_drop, known.yaw)
 
@@ -145,11 +144,6 @@ def at_pose(batch: RobotBatch, place: Placement) -> RobotBatch:
     own: ModelOptions = batch.options
     tube = own.tube.model_copy(update={"tolerance": TOLERANCE})
     return replace(batch, placement=place, options=own.model_copy(update={"tube": tube}))
-
-
-def joined(parts: list[Swimming]) -> Swimming:
-    """Several answers one after the other."""
-    return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
 
 
 def band_of(
@@ -180,7 +174,7 @@ def band_of(
         left_open(batch.pose, model),
         np.array([place.gap for place in places], dtype=float),
         np.array([place.pitch for place in places], dtype=float),
-        joined(found),
+        one_after_another(found),
         reference,
         tuple(left_out),
     )

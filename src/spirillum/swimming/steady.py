@@ -205,6 +205,11 @@ def swim(
         _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
         for cut, block in batch.blocks(_BLOCK)
     ]
+    return one_after_another(parts)
+
+
+def one_after_another(parts: Sequence[Swimming]) -> Swimming:
+    """Several answers one after the other."""
     return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
 
 
