@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context, rc_params_from_file, rcParamsDefault
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 
@@ -132,10 +132,25 @@ def styled() -> Iterator[None]:
         yield
 
 
+_PARSER: list[Any] = []  # of formulas, that of the first renderer, which keeps what it has parsed
+
+
+class _Canvas(FigureCanvasAgg):
+    """A canvas whose renderers share one parser: each has its own, and parses the formulas of a figure once more."""
+
+    def get_renderer(self) -> RendererAgg:
+        """Return the renderer of the figure's present size and resolution."""
+        renderer: RendererAgg = super().get_renderer()  # type: ignore[no-untyped-call]
+        if not _PARSER:
+            _PARSER.append(renderer.mathtext_parser)
+        renderer.mathtext_parser = _PARSER[0]
+        return renderer
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure, inches, outside pyplot's global state."""
     figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
+    _Canvas(figure)
     return figure
 
 
