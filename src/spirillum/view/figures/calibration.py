@@ -396,24 +396,26 @@ def residual_figure(found: Calibrated) -> Figure:
             for edge in edges:
                 axes.axvline(edge - 0.5, color="#888888", linewidth=0.8)
             axes.set_title(_NAMES[name], fontsize=9)
-            axes.set_ylabel("observed/model - 1 (%)")
+            axes.set_ylabel("observed/model − 1 (%)")
         last = sheet.panels[-1, 0]
         last.set_xlabel("tail: wavelength x amplitude (mm)")
         shown = spread(len(order), _MOST_NAMES)
         names_of_tails = [f"{tails[order[n]].wavelength * 1e3:g} x {tails[order[n]].amplitude * 1e3:g}" for n in shown]
+        for axes in sheet.panels.flat:
+            axes.set_xticks(list(shown), [""] * len(shown))
         last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=7)
-        last.tick_params(labelbottom=True)
         low, high = last.get_ylim()
-        last.set_ylim(low - 0.15 * (high - low), high)  # room for the names of the channels
+        last.set_ylim(low - 0.22 * (high - low), high)  # room for the names of the channels
         for start, stop in zip([0, *edges], [*edges, len(order)], strict=True):
             diameter = experiment.channels[int(experiment.channel[order[start]])] * 1e3
             last.text(
                 (0.5 * (start + stop) - 0.5),
-                0.02,
+                0.05,
                 f"channel of {diameter:g} mm",
                 transform=last.get_xaxis_transform(),
                 ha="center",
                 size=8,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
             )
         return sheet.finished()
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
@@ -15,8 +16,8 @@ from spirillum.measurement.outliers import LEADING
 from spirillum.measurement.rates import Rate
 from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.quantities import unit_of
-from spirillum.view.figures.sheet import Picture
-from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, new_figure, plain
+from spirillum.view.figures.sheet import Picture, Sheet
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, new_figure, plain
 
 if TYPE_CHECKING:
     from spirillum.measurement.measure import Measurement
@@ -130,9 +131,23 @@ def _omission_legend(left_out: Sequence[np.ndarray]) -> str:
 
 def trials_figure(measurement: Measurement) -> Figure:
     """Speeds and rates of all trials, with the mean over them."""
-    figure = new_figure(PAGE, 2.7)
-    figure.set_layout_engine("constrained")
-    for axes, name in zip(figure.subplots(1, 4), RATE_NAMES, strict=True):
+    colour = COLOURS["blue"]
+    sheet = Sheet(
+        f"{plain(measurement.robot.name, 60)}: {len(measurement.trials)} trials",
+        "synthetic, nothing is measured" if any(trial.synthetic for trial in measurement.trials) else "measured",
+        width=PAGE,
+        heights=[1.7],
+        columns=4,
+        sharey="none",
+        legend=[
+            Line2D(
+                [], [], color=colour, marker="o", markersize=3.0, linestyle="none", label="trial, its own 95 % interval"
+            ),
+            Line2D([], [], color="#444444", linewidth=0.8, label="mean"),
+            Line2D([], [], color="#dddddd", **PATCH, label="its 95 % interval over trials"),
+        ],
+    )
+    for axes, name in zip(sheet.panels.flat, RATE_NAMES, strict=True):
         items = [trial.quantities[name] for trial in measurement.trials]
         values = np.array([item.value for item in items])
         scale = UnitPrefix.of(values, unit_of(name))
@@ -144,15 +159,14 @@ def trials_figure(measurement: Measurement) -> Figure:
             axes.axhline(mean.value / scale.factor, color="#444444", linewidth=0.8)
         reach = np.array([[item.value - item.low for item in items], [item.high - item.value for item in items]])
         reach = np.where(np.isfinite(reach), reach, 0.0) / scale.factor
-        axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], markersize=3.0, capsize=2.5)
-        first, _, rest = name.partition("_")
-        axes.set_title(f"{first}\n{rest.replace('_', ' ')} ({scale.unit})", fontsize=8.0)
+        axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=colour, markersize=3.0, capsize=2.5)
+        whose, _, what = name.replace("_", " ").rpartition(" ")
+        axes.set_title(f"{whose}\n{what} ({scale.unit})", fontsize=8.0)
         axes.set_xlim(0.4, len(items) + 0.6)
         axes.set_xticks(at if len(items) <= 8 else [1.0, float(len(items))])
-        axes.yaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
         axes.set_xlabel("trial")
         if not np.isfinite(values).any():
             axes.set_yticks([])
             axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", color="#777777")
-    _say_synthetic(figure, synthetic=any(trial.synthetic for trial in measurement.trials))
-    return figure
+    return sheet.finished()

@@ -263,12 +263,15 @@ def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> PanelR
 
 def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
     """Legend entries for models, readings and observations."""
-    found = []
+    models = []
     for model in shown.models:
         look = look_of_model(model)
         line: Any = look.line if shown.grid else "none"
-        found.append(Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model)))
-    found += [*band_handles(shown), *(_friction_entries(shown) if own_drive else ())]
+        models.append(Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model)))
+    readings = [*_friction_entries(shown)] if own_drive else []
+    if len(models) == 1 and readings and not shown.grid:  # marks without a line, which are those of the readings
+        readings[0].set_label(f"{models.pop().get_label()}, {readings[0].get_label()}")
+    found = [*models, *band_handles(shown), *readings]
     if shown.observed:
         found.append(Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="observed, 95 % interval"))
     return found
