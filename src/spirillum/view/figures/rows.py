@@ -267,7 +267,9 @@ def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
     for model in shown.models:
         look = look_of_model(model)
         line: Any = look.line if shown.grid else "none"
-        models.append(Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model)))
+        models.append(
+            Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model))
+        )
     readings = [*_friction_entries(shown)] if own_drive else []
     if len(models) == 1 and readings and not shown.grid:  # marks without a line, which are those of the readings
         readings[0].set_label(f"{models.pop().get_label()}, {readings[0].get_label()}")
