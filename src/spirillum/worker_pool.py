@@ -1,6 +1,6 @@
 """Work shared among processes: on this machine, or by the workers of a Dask cluster.
 
-Answers come back to this process, which alone writes. A worker that is killed loses what it was at, and another one
+Answers come back to this process, which alone writes. The task of a worker that is killed is lost, and another one
 does it again; where client or scheduler are killed, what was answered is kept, and the same call goes on from there.
 """
 

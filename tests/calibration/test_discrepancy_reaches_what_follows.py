@@ -1,7 +1,6 @@
 """Intervals agree with one another: what is computed from a disturbed speed or rate is disturbed with it."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,10 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.intervals import intervals_of
-from spirillum.swimming.steady import Swimming
+from spirillum.swimming.steady import STEADY
 
 WIDE = "biorob2012-wide"
-NAMES = [f.name for f in fields(Swimming) if f.name != "valid"]
+NAMES = [item.name for item in STEADY]
 SBT = find_swimmer_model("sbt")
 
 

@@ -10,17 +10,18 @@ from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.swimming.steady import requirements, swim
+from spirillum.swimming.steady import STEADY, requirements, swim
 
 BLOCK = 1 << 15
 WAVELENGTHS = np.array([10e-3, 15e-3, 20e-3, 25e-3])
 AMPLITUDES = np.array([1.5e-3, 2.5e-3, 3.5e-3, 2.0e-3])
 FRICTIONS = np.array([7e-7, 1e-6, 1e-5, 3e-5])
+_NAMES = [item.name for item in STEADY]
 
 
 def assert_equal(together: Any, i: int, alone: Any, rtol: float = 1e-13) -> None:
-    for name, values in vars(together).items():
-        np.testing.assert_allclose(values[i], getattr(alone, name)[0], rtol=rtol, err_msg=name)
+    for name in (*_NAMES, "valid"):
+        np.testing.assert_allclose(getattr(together, name)[i], getattr(alone, name)[0], rtol=rtol, err_msg=name)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +86,7 @@ def test_borders_between_blocks(wide: Any) -> None:
     rng = np.random.default_rng(1)
     wavelengths, rates = rng.uniform(10e-3, 40e-3, size), rng.uniform(1, 10, size)
     together = swim(wide.with_values({"tail.wavelength": wavelengths}), "sbt", tail_rate=rates)
-    assert all(values.shape == (size,) for values in vars(together).values())
+    assert all(getattr(together, name).shape == (size,) for name in (*_NAMES, "valid"))
     assert together.valid.all()
     for i in (0, BLOCK - 1, BLOCK, 2 * BLOCK - 1, 2 * BLOCK, size - 1):
         one = wide.with_values({"tail.wavelength": wavelengths[i]})
@@ -130,10 +131,10 @@ def test_one_robot_that_cannot_be_leaves_the_others_alone(wide: Any, model: str,
     batch = wide.with_values({path: [fine[path], value, fine[path]] for path, value in broken.items()})
     together, alone = swim(batch, model), swim(wide, model)
     assert together.valid.tolist() == [True, False, True]
-    for name, values in vars(together).items():
-        if name != "valid":
-            assert np.isnan(values[1]), name
-            np.testing.assert_allclose(values[[0, 2]], getattr(alone, name)[0], rtol=1e-12, err_msg=name)
+    for name in _NAMES:
+        values = getattr(together, name)
+        assert np.isnan(values[1]), name
+        np.testing.assert_allclose(values[[0, 2]], getattr(alone, name)[0], rtol=1e-12, err_msg=name)
 
 
 _ATTRIBUTES = {

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.swimming.drives import battery_voltage, winding_resistance
-from spirillum.swimming.steady import swim
+from spirillum.swimming.steady import STEADY, swim
 from spirillum.units import Hz
 
 K_M, K_B, B_M = 0.00045, 0.004, 7e-7  # Table II
@@ -221,10 +221,19 @@ def test_left_handed_robot_is_the_mirror_image(batch_of: Callable[..., Any], mod
     )
     signs = {"tail_rotation_rate": -1, "body_rotation_rate": -1, "motor_rotation_rate": -1, "motor_current": -1}
     signs |= {"drive_torque": -1, "advance_per_radian": -1}
-    for name in vars(right):
-        if name != "valid":
-            wanted = signs.get(name, 1) * getattr(right, name)
-            np.testing.assert_allclose(getattr(left, name), wanted, rtol=1e-12, err_msg=name)
+    for name in (item.name for item in STEADY):
+        wanted = signs.get(name, 1) * getattr(right, name)
+        np.testing.assert_allclose(getattr(left, name), wanted, rtol=1e-12, err_msg=name)
+
+
+def test_walls_that_a_model_leaves_out_are_said(batch_of: Callable[..., Any]) -> None:
+    """In a channel, by every model without walls, also where calibration factors stand for them."""
+    robot = batch_of()
+    for model in MODELS:
+        assert [note.code for note in swim(robot, model).notes] == ["walls-left-out"]
+    assert swim(robot, "sbt", calibrated=False).notes != swim(robot, "sbt").notes
+    assert swim(robot, "tube").notes == ()
+    assert swim(batch_of(channel=None), "rft").notes == ()
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -70,7 +70,7 @@ class Bank:
         arguments: Mapping[str, Any] | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Lay the members down."""
+        """Create the ensemble members at their start."""
         if robot.drive is None or robot.drive.kind != "dc-motor":
             raise InputError(f"learn is given with {robot.name}; allowed: a robot with drive.kind 'dc-motor'")
         self.friction, self.gap = points(unknown.friction_factor), points(unknown.gap_factor)

@@ -117,7 +117,7 @@ _POOL = 500  # Draws of a posterior that robots are taken from.
 
 
 class AxialBatch:
-    """Robots in axial motion, all of them one step at a time; for one thread.
+    """Robots in axial motion, all of them one step at a time; not thread-safe.
 
     All are the same robot, or are sampled around it. Arrays have one value for each robot, SI, signed about +x.
     """

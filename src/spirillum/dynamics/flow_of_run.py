@@ -168,7 +168,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     notes = list(notes_in(now.attrs))
     if gap < drawn:
         notes.append(Note.named("lifted-off-film", film=show(gap, "um"), lift=show(drawn - gap, "um")))
-    nothing = {item.name: np.array([np.nan]) for item in STEADY}
+    nothing: dict[str, Any] = {item.name: np.array([np.nan]) for item in STEADY}
     known = {
         "forward_velocity": float(now["velocity"].values[0]),
         "body_rotation_rate": float(now["body_rotation_rate"]),

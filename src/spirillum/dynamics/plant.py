@@ -82,7 +82,7 @@ def uninterrupted(moment: Snapshot) -> Snapshot:
 
 
 class Plant:
-    """A free robot in motion from rest, one step at a time; for one thread."""
+    """A free robot in motion from rest, one step at a time; not thread-safe."""
 
     @validate_arguments
     def __init__(
@@ -99,7 +99,7 @@ class Plant:
         in_tube: InTube | Mapping[str, Any] | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Lay a robot down at rest.
+        """Release a robot from rest.
 
         Args:
             robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.

@@ -148,6 +148,8 @@ def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str
     found = list(robot.warnings)
     if part not in ("body", "coupling"):
         found += [limit.caution() for limit in broken(model.cautions(batch))]
+    if robot.channel is not None and not (isinstance(model, SwimmerModel) and model.placed):
+        found.append(Note.named("resistance-without-walls", model=model.name))
     if model.axial_only:
         found.append(Note.named("axial-entries", model=model.name))
     if part in ("rotor", "robot", _BOTH) and robot.coupling.length > 0 and "coupling" not in model.parts:

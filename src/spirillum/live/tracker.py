@@ -30,7 +30,7 @@ _GOLDEN = 0.618034  # step of the low-discrepancy sequence that spreads them
 
 
 class LiveTracker:
-    """Follows one robot through pictures that are handed over one by one; for one thread.
+    """Follows one robot through pictures that are handed over one by one; not thread-safe.
 
     Nothing looks ahead: what is said of a frame follows from it and those before it.
     """

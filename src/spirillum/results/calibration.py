@@ -155,7 +155,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
             `prepare` makes it, and what is free is of that model; else `sbt`.
         free: free parameters; None: those that the paper fitted with this model, with `tube` gap,friction.
         method: `posterior`, `least-squares`, or `paper` (its inversion of (15) and (18)).
-        friction: reading under which B_eff follows from (18): `rotor` or `paper`.
+        friction: friction model for which B_eff follows from (18): `rotor` or `paper`.
         assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or
             `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
             taken as exact.

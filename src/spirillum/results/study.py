@@ -200,7 +200,7 @@ def study(  # noqa: PLR0913 - the options of the command
         store: instead of `output`, a Zarr store (`study.zarr`), written a region after the other: for more robots than
             fit into memory. A rerun adds what is missing.
         calibration: calibration file, applied to every robot.
-        posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
+        posterior: file of a calibration's posterior: its medians are applied to every robot, and the answers of its
             model have 95 % intervals.
         figures: draw figures and write the report.
         vector: write figures as SVG beside PNG.

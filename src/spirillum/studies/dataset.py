@@ -347,7 +347,8 @@ def _beyond_stokes(task: ModelTask, part: Part, left: Flags) -> list[Caution]:
 def cautions(task: ModelTask, part: Part) -> list[Caution]:
     """What to be careful about in a task's answer, and why robots have none, one for each kind."""
     size = task.batch.size
-    first = Swimming(**{item.name: part[item.name][:, 0] for item in STEADY}, valid=part["outside"][:, 0] == 0)
+    columns: dict[str, Any] = {item.name: part[item.name][:, 0] for item in STEADY}
+    first = Swimming(**columns, valid=part["outside"][:, 0] == 0)
     found = _refusals(task, part)
     for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
         holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))

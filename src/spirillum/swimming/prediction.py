@@ -283,7 +283,9 @@ def free_in_tube(fitted_by: str) -> str:
 
 def with_posterior_medians(swum: Swimming, intervals: Intervals) -> Swimming:
     """The steady motion with the medians of intervals where they are known."""
-    middles = {name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)}
+    middles: dict[str, Any] = {
+        name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)
+    }
     return replace(swum, **middles)
 
 

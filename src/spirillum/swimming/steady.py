@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any, cast, get_args
 
@@ -17,6 +17,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note
 from spirillum.quantities import QUANTITIES, Quantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
@@ -65,6 +66,7 @@ class Swimming(DisplayMixin):
     step_out_rate: PerRobot
     phase_lag: PerRobot
     valid: Flags
+    warnings: tuple[Note, ...] = ()  #: Of the whole batch.
 
     def to_dict(self) -> dict[str, Any]:
         """Median, least and largest of every quantity over the robots, as data."""
@@ -79,7 +81,7 @@ class Swimming(DisplayMixin):
                 if column.size
             },
         }
-        return envelope("swimming", content, ())
+        return envelope("swimming", content, self.warnings)
 
     def _display_content(self) -> tuple[Mapping[str, Any], list[str]]:
         """See `DisplayMixin`: the quantities that matter most."""
@@ -87,7 +89,7 @@ class Swimming(DisplayMixin):
         return answer, [name for name in HEADLINE if name in answer][:_SHOWN]
 
 
-STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.name != "valid")
+STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.type == "PerRobot")
 """The quantities of steady swimming, in their order."""
 
 
@@ -189,7 +191,7 @@ def swim(
         numbers themselves are then given.
 
     Raises:
-        InputError: for an unknown model or reading, rates that do not match the batch, or robots whose drive
+        InputError: for an unknown model or friction model, rates that do not match the batch, or robots whose drive
             leaves the motion open.
     """
     chosen = find_swimmer_model(model) if isinstance(model, str) else model
@@ -205,12 +207,22 @@ def swim(
         _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
         for cut, block in batch.blocks(_BLOCK)
     ]
-    return one_after_another(parts)
+    return replace(one_after_another(parts), warnings=_wall_notes(batch, chosen, calibrated=calibrated))
+
+
+def _wall_notes(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool) -> tuple[Note, ...]:
+    """What a model without walls leaves out of robots in channels."""
+    if model.placed or not np.any(np.isfinite(batch.channel_diameter)):
+        return ()
+    factors = calibrated and model.name in batch.calibration
+    return (Note.named("factors-for-walls" if factors else "swimming-without-walls", model=model.name),)
 
 
 def one_after_another(parts: Sequence[Swimming]) -> Swimming:
     """Several answers one after the other."""
-    return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
+    names = (*(item.name for item in STEADY), "valid")
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return Swimming(**arrays, warnings=tuple(dict.fromkeys(note for part in parts for note in part.warnings)))
 
 
 def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
@@ -347,8 +359,6 @@ def swimming_of(batch: RobotBatch, known: Mapping[str, PerRobot], valid: Flags) 
     shaped = {name: np.where(moving, value, np.nan) for name, value in reynolds.items()}  # why a motion is refused
     moving = moving & is_stokes_flow(batch, reynolds_limits(batch, *shaped.values()))
     shaped |= {name: np.where(moving, value, np.nan) for name, value in values.items()}
-    size = batch.size
-    return Swimming(
-        **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},
-        valid=np.array(np.broadcast_to(moving, (size,))),
-    )
+    columns = {**shaped, "valid": moving}
+    arrays: dict[str, Any] = {name: np.array(np.broadcast_to(value, (batch.size,))) for name, value in columns.items()}
+    return Swimming(**arrays)
