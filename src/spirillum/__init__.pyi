@@ -1,6 +1,7 @@
 """Public names and the modules that define them: read by type checkers, and by `lazy_loader` at run time."""
 
 from .calibration.calibrated import Calibrated as Calibrated
+from .calibration.posterior import Sampling as Sampling
 from .calibration.ranking import Ranking as Ranking
 from .calibration.ranking import rank_models as rank_models
 from .calibration.suggest import Suggestion as Suggestion
@@ -16,10 +17,13 @@ from .dynamics.comparison import compare_models as compare_models
 from .dynamics.flow_of_run import flow_of_run as flow_of_run
 from .dynamics.plant import Plant as Plant
 from .dynamics.prediction import predict as predict
+from .dynamics.release import InTube as InTube
+from .dynamics.rotating_field import Field as Field
 from .dynamics.rotating_field import magnetic_sweep as magnetic_sweep
 from .dynamics.settling import Settling as Settling
 from .dynamics.settling import settle as settle
 from .dynamics.simulation import simulate as simulate
+from .dynamics.timing import Timing as Timing
 from .errors import InputError as InputError
 from .exports.recording import Recording as Recording
 from .exports.recording import export_run as export_run
@@ -27,6 +31,7 @@ from .exports.write import Export as Export
 from .exports.write import export as export
 from .fields.flow import Flow as Flow
 from .fields.flow import flow as flow
+from .fluid.model import SwimmerModel as SwimmerModel
 from .fluid.resistance import Resistance as Resistance
 from .fluid.resistance import resistance as resistance
 from .interfaces.bench import Bench as Bench
@@ -46,6 +51,7 @@ from .measurement.feasibility import feasibility as feasibility
 from .measurement.measure import Measurement as Measurement
 from .measurement.proposal import Proposal as Proposal
 from .measurement.proposal import propose_setup as propose_setup
+from .notes import Note as Note
 from .pages.launch import page as page
 from .papers.validation import Validation as Validation
 from .results.calibration import calibrate as calibrate
@@ -56,6 +62,8 @@ from .results.study import study as study
 from .results.validation import validate as validate
 from .robot.batch import RobotBatch as RobotBatch
 from .robot.load import load as load
+from .robot.model_options import Resolution as Resolution
+from .robot.placement import Placement as Placement
 from .robot.robot import Robot as Robot
 from .swimming.prediction import Prediction as Prediction
 from .swimming.preparation import Prepared as Prepared

@@ -95,9 +95,10 @@ class Robot(RobotTables):
 
     def __repr__(self) -> str:
         """The robot in a line: name, body, tail and channel."""
-        body = show(self.body.diameter, "mm") if self.has_body else "none"
-        parts = [f"body {body}", f"tail {self._tail_size} mm"]
-        parts += [f"channel {show(self.channel.diameter, 'mm')}"] if self.channel is not None else []
+        unit = display_unit(self.tail.amplitude, "m")
+        body = show(self.body.diameter, unit) if self.has_body else "none"
+        parts = [f"body {body}", f"tail {in_unit(self.tail.wavelength, 'm', unit)} x {show(self.tail.amplitude, unit)}"]
+        parts += [f"channel {show(self.channel.diameter, unit)}"] if self.channel is not None else []
         return f"Robot({self.name}, {', '.join(parts)})"
 
     def __str__(self) -> str:
