@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 
 import spirillum as sp
@@ -74,6 +75,14 @@ def test_robots_that_are_released_have_tables_in_the_package(monkeypatch: pytest
 @pytest.mark.parametrize("name", CHEAP)
 def test_cheap_cases_are_as_recorded(name: str) -> None:
     assert not sp.validate([name]).outside
+
+
+@pytest.mark.parametrize(("name", "off"), [("rodenborn2013", 0.12), ("purcell1997", 0.35)])
+def test_forces_on_helices_are_those_that_were_measured(name: str, off: float) -> None:
+    """Every row within what `docs/validation.md` says of it; half of them within a tenth."""
+    ratios = np.array([row.ours / row.published for row in sp.validate([name]).rows])
+    assert np.max(np.abs(ratios - 1.0)) < off
+    assert np.median(np.abs(ratios - 1.0)) < 0.1
 
 
 @pytest.mark.slow
