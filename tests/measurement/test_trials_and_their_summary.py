@@ -171,6 +171,9 @@ def test_a_reason_names_one_thing_to_do(make_track: Make, robot: Any) -> None:
     assert [flag.name for flag in mirrored.flags] == ["mirrored"]
     for name in (*tail, *body, "motor_rotation_rate"):
         assert "mirror the film back" in mirrored.quantities[name].reason
+    turned = Flag.named("nose-on-the-other-side", side="left", why="turned round, it has the robot's tail")
+    round_about = trial_of(make_track(flags=(turned, order, hand)), robot, "a")
+    assert [flag.name for flag in round_about.flags] == ["nose-on-the-other-side"]
     other = trial_of(make_track(flags=(replace(order, sentence="in another order"), hand)), robot, "a")
     assert [flag.name for flag in other.flags] == ["stripe-order", "handedness"]
 
