@@ -27,12 +27,15 @@ def test_a_new_setup_is_valid_and_says_what_depth_costs(run: Run, setup_file: st
 
 
 def test_readings_by_hand_alone_are_measured(run: Run, tmp_path: Path, setup_file: str) -> None:
-    """Five trials as the paper has taken them: 1 mm/s, tail 0.5 Hz, body -0.1 Hz, all exact but for the third speed."""
+    """Five trials as the paper has taken them: 1 mm/s, tail 0.5 Hz, body -0.1 Hz, all exact but for the third speed.
+
+    They start at other places: equal ones would be copies of one trial.
+    """
     marks = tmp_path / "marks.csv"
     rows = ["video,time_s,x_mm,tail_phase_deg,body_angle_deg"]
     for trial in range(5):
         speed = 1.02 if trial == 2 else 1.0
-        rows += [f"trial-{trial}.mp4,{t},{speed * t},{180 * t},{-36 * t}" for t in range(0, 21, 2)]
+        rows += [f"trial-{trial}.mp4,{t},{trial + speed * t},{180 * t},{-36 * t}" for t in range(0, 21, 2)]
     marks.write_text("\n".join(rows))
     videos = [f"trial-{trial}.mp4" for trial in range(5)]
     folder = tmp_path / "out"

@@ -51,7 +51,7 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
                     ]
                     geometry = [float(one["channel_diameter"]) * 1e3, wavelength * 1e3, amplitude * 1e3]
                     for trial in range(5):
-                        scaled = [repr(float(v * (1 + spread * (trial - 2)))) for v in values]
+                        scaled = [repr(float(v * (1 + (spread or 1e-12) * (trial - 2)))) for v in values]
                         rows.append(",".join(["synthetic", *(f"{g:.6g}" for g in geometry), str(trial + 1), *scaled]))
         path = tmp_path_factory.mktemp("observations") / "observations.csv"
         path.write_text("\n".join(rows) + "\n", encoding="utf-8")
