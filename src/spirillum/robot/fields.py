@@ -288,8 +288,8 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
         "float_parsing": "a number",
         "float_type": "a number",
         "string_too_long": f"at most {context.get('max_length')} characters",
-        "string_too_short": f"at least {context.get('min_length')} character",
-        "string_type": "text, a string in quotes",
+        "string_too_short": "text that is not empty",
+        "string_type": "text in quotes",
         "bool_type": "true or false",
         "bool_parsing": "true or false",
     }
