@@ -21,10 +21,8 @@ from typing import Any, TextIO
 
 __all__ = ["main"]
 
-_NAMING = (
-    *("calibrate", "film", "measure", "observations", "rank-models", "robot", "setup", "study", "suggest"),
-    "virtual-experiment",
-)
+_READING = ("calibrate", "film", "rank-models", "suggest")  # commands of a file, which look at their options themselves
+_NAMING = (*_READING, "measure", "observations", "robot", "setup", "study", "virtual-experiment")
 """Commands whose arguments name files and folders."""
 _INSTEAD = {
     ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "
@@ -169,9 +167,9 @@ def _check_names(arguments: Sequence[str]) -> None:
     if not arguments or arguments[0] not in _NAMING:
         return
     for before, word in pairwise(arguments):
-        if not word:
+        if not word and not (arguments[0] in _READING and before.startswith("-")):
             raise InputError(f"an empty word after {before[:60]}; allowed: a name or a value")
-        if word.startswith("--") and word.find("=") == len(word) - 1:
+        if word.startswith("--") and word.find("=") == len(word) - 1 and arguments[0] not in _READING:
             raise InputError(f"an empty word after {word[:60]}; allowed: a name or a value")
 
 
