@@ -122,7 +122,7 @@ def test_a_robot_in_anothers_channel_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["calibrate", "observations.csv", WIDE, "-o", ""], "an empty word after -o; allowed: a name"),
+        (["calibrate", "observations.csv", WIDE, "-o", ""], "-o '' is empty; allowed: -o DIR"),
         (["suggest", "posterior.nc", "--rows", "0"], "rows = 0; allowed: at least 1"),
     ],
 )
