@@ -106,13 +106,13 @@ def outlier_warnings(problem: Problem, z: Samples) -> list[Note]:
 
 def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], fit: LeastSquares) -> list[Note]:
     """State the model's discrepancy, so that a wrong model does not look certain."""
-    found = []
+    found, left = [], _misfits(problem, fit.z)
     for name, size in discrepancy.items():
         words = {"model": problem.model.name, "called": CALLED[name], "fields": (name,)}
         misfit = min(size.value, fit.discrepancy[name])  # by the residuals, and not the prior alone
         few, one = fit.left[name] < FEWEST_LEFT, np.count_nonzero(problem.ratio(name).is_observed) == 1
-        if (few or one) and misfit > _BEYOND_TRIALS:
-            share, tails = percent(fit.discrepancy[name]), "one tail" if one else "so few"
+        if (few or one) and left[name] > _BEYOND_TRIALS:
+            share, tails = percent(left[name]), "one tail" if one else "so few"
             found.append(Note.named("factors-miss", share=share, tails=tails, **words))
         beyond = ""
         if few or one:
@@ -129,12 +129,19 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
     return found
 
 
+def _misfits(problem: Problem, z: Samples) -> dict[Quantity, float]:
+    """Root mean square residual of each quantity over the tails, relative to what is predicted."""
+    found = {}
+    for name, values in problem.predicted_at(z).items():
+        ratio = problem.ratio(name)
+        found[name] = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.is_observed] ** 2)))
+    return found
+
+
 def factor_misfit_warnings(problem: Problem, z: Samples) -> list[Note]:
     """Root mean square misfit of a fit without an error model."""
     found = []
-    for name, values in problem.predicted_at(z).items():
-        ratio = problem.ratio(name)
-        size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.is_observed] ** 2)))
+    for name, size in _misfits(problem, z).items():
         if size > _LARGE_MISFIT:
             words = {"model": problem.model.name, "called": CALLED[name], "fields": (name,)}
             found.append(Note.named("factors-leave", size=percent(size), **words))

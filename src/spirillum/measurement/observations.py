@@ -215,8 +215,8 @@ def without_copies(observations: Iterable[ObservationRow]) -> tuple[list[Observa
     """The rows without those that repeat another one of their tail in every number, and a note on each such row."""
     alike: dict[tuple[object, ...], list[ObservationRow]] = {}
     for item in observations:
-        numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate)
-        alike.setdefault((item.tail, repr(numbers)), []).append(item)
+        numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate, *item.intervals)
+        alike.setdefault((item.tail, repr([number + 0.0 for number in numbers])), []).append(item)
     notes = (
         Note.named("copied-trials", first=items[0].row, rows=rows_in_words(item.row for item in items[1:]))
         for items in alike.values()

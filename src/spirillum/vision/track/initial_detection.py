@@ -308,6 +308,8 @@ def close_place(frame: Frame, still: Samples, body: BodyFinder, guess: BodyPose)
 
 def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:
     """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
+    if not known:
+        return _Learnt([], [], 0.0, [])
     found = [close_place(frame, still, body, pose_on_path(known, frame.time)) for frame in frames]
     usual = float(np.quantile([one.score for one in found], 0.8))
     found = _search_unclear_frames(found, usual, body, frames, still)
