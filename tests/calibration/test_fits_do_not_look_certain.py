@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from tests.support.commands import run_command
 
 import spirillum as sp
 from spirillum import InputError
+from spirillum.measurement.observations import ObservationRow, without_copies
 from spirillum.robot.batch import RobotBatch
 
 WIDE = "biorob2012-wide"
@@ -172,6 +174,8 @@ def test_one_tail_alone_is_not_said_to_be_missed(made: Callable[..., Path]) -> N
         found = sp.calibrate(made(**one, seed=7), WIDE, free=free, method="least-squares", model="sbt")
         assert not any("from tail to tail, beyond" in warning for warning in found.warnings)
         assert any("a typical one is used" in warning for warning in found.warnings)
+        best = sp.calibrate(made(**one, seed=7), WIDE, method="least-squares", model="sbt")  # as many factors as means
+        assert not any("the best fit is" in warning for warning in best.warnings)
 
 
 def test_one_tail_far_off_the_fit_is_not_laid_on_the_model(tmp_path: Path) -> None:
@@ -185,6 +189,15 @@ def test_one_tail_far_off_the_fit_is_not_laid_on_the_model(tmp_path: Path) -> No
     assert re.search(r"the best fit is \d+ % off the speed, and one tail cannot tell whether 'tube' or a fixed", said)
     assert "one tail cannot tell it from wrong fixed numbers" in said
     assert "misses the" not in said
+
+
+def test_rows_that_state_other_intervals_are_no_copies() -> None:
+    """And zero is zero, whatever its sign."""
+    row = ObservationRow(2, WIDE, 0.04, 0.025, 2.5e-3, 1e-3, 5.0, 0.0, 5.0, 1, (1e-4, 0.1, 0.1, 0.1))
+    other = replace(row, row=3, intervals=(1e-6, 0.1, 0.1, 0.1))
+    kept, notes = without_copies([row, other, replace(row, row=4, body_rate=-0.0)])
+    assert [item.row for item in kept] == [2, 3]
+    assert [note.code for note in notes] == ["copy-of-a-trial"]
 
 
 def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None:

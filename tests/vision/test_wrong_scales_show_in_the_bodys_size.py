@@ -1,13 +1,18 @@
 """A wrong scale makes the body look too large or too small: speeds are doubted or withheld, rates are not touched."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from comparisons import slope
+from spirillum.errors import InputError
+from spirillum.robot.load import load
 from spirillum.vision.camera.camera import bounds_of, scale_of
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.learning import _check_scale
 from spirillum.vision.track.size import checked_scale
 
 pytest.importorskip("av")
@@ -130,3 +135,12 @@ def test_a_robot_at_rest_is_placed_by_its_outline_and_its_tail_is_read(resting):
     assert slope(found.time, found.position[:, 0]) == pytest.approx(0.0, abs=2e-6)
     assert slope(found.time, found.tail_phase) == pytest.approx(2.0, rel=5e-3)
     assert not [flag for flag in found.flags if flag.spoils]
+
+
+def test_a_scale_in_another_unit_is_refused_before_an_outline_is_computed() -> None:
+    """What would take minutes, or more memory than there is."""
+    video, robot = SimpleNamespace(name="video", size=(320, 240)), load("biorob2012-wide")
+    for length_per_pixel in (2e-9, 0.52e-6, 10.0):
+        with pytest.raises(InputError, match="pixels long; allowed: 4 to 1280 of this picture"):
+            _check_scale(video, length_per_pixel, robot)
+    _check_scale(video, 0.52e-3, robot)

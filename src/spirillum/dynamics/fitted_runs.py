@@ -54,7 +54,7 @@ def chosen_run(
     if not choice.fitted:
         if fit.models and choice.model not in fit.models:
             notes.append(Note.named("fit-of-another-model", fit=fit.name, fitted=fit.models[0], model=choice.model))
-        return choice, motion or "free", notes
+        return choice, "free" if motion is None else motion, notes
     notes.append(Note.named("model-of-run", model=choice.model, reason=choice.reason))
     chosen = find_swimmer_model(choice.model)
     if motion is None and chosen.placed and fit.friction_coefficient:
@@ -66,7 +66,7 @@ def chosen_run(
         return choice, "held", notes
     if motion != "held" and chosen.placed and fit.posterior is None and not fit.of_trials:
         notes.append(Note.named("calibration-of-held"))
-    return choice, motion or "free", notes
+    return choice, "free" if motion is None else motion, notes
 
 
 def sample_count(draws: int | None, posterior: PosteriorFile | None) -> int:

@@ -123,7 +123,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             resolution=resolution,
             placement=placement,
             band=band,
-            motion=motion or "held",
+            motion="held" if motion is None else motion,
             progress=progress,
         )
         held = replace(held, warnings=(*held.warnings, *([FITTED_TRIAL] if of_trials else idle)))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import background, bounds_of, sight_of
 from spirillum.vision.camera.optics import BodyPose, project
@@ -23,6 +24,9 @@ from spirillum.vision.track.search import searched_at
 from spirillum.vision.video import opencv as cv2
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
+
+_SMALLEST = 4  # Shortest body in a picture, pixels.
+_LARGEST = 4  # Longest one, over the larger side of the picture.
 
 
 @dataclass(frozen=True)
@@ -224,6 +228,17 @@ class InitialDetection(NamedTuple):
         return (*known.start.flags, *known.flags, *known.stripes.flags, *wire, *self.glare.flags)
 
 
+def _check_scale(video: Video, length_per_pixel: float, robot: Robot) -> None:
+    """Refuse a scale at which no body of this length can be looked for, before its outline is computed."""
+    length = robot.body.length if robot.has_body else robot.tail.length
+    pixels, most = length / length_per_pixel, _LARGEST * max(video.size)
+    if not _SMALLEST <= pixels <= most:
+        raise InputError(
+            f"{video.name}: at {1e3 * length_per_pixel:.3g} mm a pixel '{robot.name}' would be {pixels:.3g} pixels "
+            f"long; allowed: {_SMALLEST} to {most:.0f} of this picture: check [markers], and the unit of its lengths"
+        )
+
+
 def learnt_from(
     video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None, *, by_seal: bool = True
 ) -> InitialDetection:
@@ -231,6 +246,7 @@ def learnt_from(
     factor = reduction(video.size)
     still = background(frames, factor)
     sight = sight_of(video, setup, still, folder, frames)
+    _check_scale(video, sight.optics.length_per_pixel, robot)
     finder = BodyFinder(robot, sight.optics, bounds_of(setup, video))
     searched = searched_at(finder.shape().width, factor)
     still = still if searched == factor else background(frames, searched)
