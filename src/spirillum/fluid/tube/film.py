@@ -329,8 +329,9 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
 def _off_the_wall(body: FilmBody, radius: float, e: float, p: float, psi: float) -> tuple[float, float, float]:
     """Node of a table, less inclined where the body would touch the wall: only the splines know it, no robot."""
     least = _THINNEST * body.radius
+    most = radius - body.radius - least  # on either side: in a narrow tube nodes reach the wall above the body
     while not body.half and Place(body, radius, e, frame(p, psi)).ends().min() < 0.5 * least:
-        e, p, psi = min(e, radius - body.radius - least), _LESS * p, _LESS * psi
+        e, p, psi = float(np.clip(e, -most, most)), _LESS * p, _LESS * psi
     return e, p, psi
 
 
