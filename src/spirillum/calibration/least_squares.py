@@ -39,7 +39,7 @@ _BLIND = 1e-8  # relative change of a prediction by one standard deviation of a 
 LARGEST = 12.0  #: Standard deviations of the prior to either side within which a fit looks.
 _BREATH = 1e-2  # weight of the prior in the first fit: it holds a number that nothing observed holds, and no other
 FEWEST_LEFT = 0.5  #: Degrees of freedom below which a fit leaves no residual to judge the model by.
-_MIDDLE = 0.6745  # median of a half-normal number over its scale
+PRIOR_DISCREPANCY = 0.6745 * DISCREPANCY_SCALE  #: Median of the half-normal prior of a model's discrepancy.
 _SHARP = 0.01  # relative error assumed of all observations to count the parameters that a quantity constrains
 LEAST_ERROR = 1e-3  #: Relative error that no mean is known better than: else one would outweigh all others.
 
@@ -263,7 +263,7 @@ def _discrepancy(
     found: dict[Quantity, float] = {}
     for name, (square, expected) in _squares(problem, z, error).items():
         if left[name] < FEWEST_LEFT:
-            found[name] = _MIDDLE * DISCREPANCY_SCALE
+            found[name] = PRIOR_DISCREPANCY
             continue
         count = np.count_nonzero(problem.ratio(name).is_observed)
         found[name] = float(np.sqrt(max(square * count / left[name] - expected, 0.0)))

@@ -76,7 +76,9 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
 
 
 def _in_the_lab(answer: Answer, released: Sequence[str]) -> Iterator[str]:
-    """Which of the motions a robot has in an experiment."""
+    """Which of the motions a robot has in an experiment; a fit of held robots says in its caution what to compare."""
+    if any(note["code"] == "fit-other-motion" for note in answer["notes"]):
+        return
     if "trial" in released:
         later = ", later as in steady" if "steady" in released else ""
         yield f"in the lab: a robot laid in its tube swims as in trial{later}; held is for a known gap and pitch"

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from spirillum.arrays import Samples
-from spirillum.calibration.least_squares import FEWEST_LEFT
+from spirillum.calibration.least_squares import PRIOR_DISCREPANCY
 from spirillum.display import label_of_model, percent
 from spirillum.units import Hz
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
@@ -152,7 +152,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     fit = found.least_squares
     held = " and ".join(
         f"{percent(share)} of the {name.replace('_', ' ')} "
-        f"({'prior median' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
+        f"({'prior median' if share == PRIOR_DISCREPANCY else 'moments of the residuals'})"
         for name, share in fit.discrepancy.items()
     )
     synthetic = " (synthetic)" if found.experiment.synthetic else ""
