@@ -68,6 +68,8 @@ def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
         name: kind.model_construct(**table[name]) if table.get(name) else None for name, kind in _PARTS.items()
     }
     robot = Robot.model_construct(name=str(table["name"]), **parts)
+    if "channel" in dataset.dims:  # its tail is not the one of the file that names it
+        robot = robot.model_copy(update={"name": robot.with_tail})
     words = robot_words(robot)
     first = f"the first of the ranking: {ranking.robots[0].name}" if ranking.robots else "the study's first robot"
     return Picture("The robot", f"{words} Drawn is {first}.", words, lambda: robot_figure(robot))
