@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
-from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.errors import ArgumentError, InputError, clipped, did_you_mean
 from spirillum.scalars import is_number, is_true_or_false, is_whole
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def validate_arguments(function: Callable[P, R]) -> Callable[P, R]:
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         for name in kwargs:
             if name not in names and not open_ended:
-                raise InputError(
+                raise ArgumentError(
                     f"{name} is no argument of {called}(){did_you_mean(name, own)}; allowed: {', '.join(own)}"
                 )
         for name, value in {**dict(zip(names, args, strict=False)), **kwargs}.items():

@@ -25,6 +25,10 @@ class InputError(ValueError):
         super().__init__(sentence)
 
 
+class ArgumentError(InputError, TypeError):
+    """A keyword that a public function does not have."""
+
+
 def _one_line(text: str) -> str:
     """The text in one printable line, whatever a user's file put into it."""
     line = "".join(c if c.isprintable() else "?" for c in " ".join(text[:_LONGEST].split()))

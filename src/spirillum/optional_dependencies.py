@@ -9,8 +9,8 @@ from spirillum.errors import InputError
 
 
 def installation_of(extra: str) -> str:
-    """Return how an extra is installed; the package is on no index, so that it is installed from its own folder."""
-    return f"pip install '.[{extra}]' in the project's folder"
+    """Return how an extra is installed, from the package's folder or by a project that requires the package."""
+    return f"pip install '.[{extra}]' in the project's folder, or require spirillum[{extra}]"
 
 
 def import_optional(name: str, purpose: str, extra: str = "3d") -> ModuleType:

@@ -13,7 +13,7 @@ from spirillum.cli import main
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.files import write_dataset
 
-HINT = "pip install '.[3d]' in the project's folder"
+HINT = "pip install '.[3d]' in the project's folder, or require spirillum[3d]"
 
 
 @pytest.fixture
