@@ -269,7 +269,8 @@ class Stripes:
         sums, weights = np.zeros_like(appearance.palette), np.zeros(len(appearance.palette))
         models, wanted, good_at, residuals, squares = [], [], [], [], []
         fits = self._fits(profiles, scales, appearance)
-        losses = np.where(np.isfinite(fits[:, 0]) & self._determined_frames(fits), fits[:, 2] / fits[:, 4], np.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):  # frames without a readable angle, which do not count
+            losses = np.where(np.isfinite(fits[:, 0]) & self._determined_frames(fits), fits[:, 2] / fits[:, 4], np.inf)
         best = np.argsort(losses)[: max(3, int(0.8 * np.isfinite(losses).sum()))]
         shade, sheen = appearance.shade[:, :3], appearance.shade[:, 3:]
         for which in best[np.isfinite(losses[best])]:
