@@ -93,21 +93,6 @@ def test_signal_ends_work_of_one_process_too(tmp_path: Path) -> None:
     assert (ended, "poses are saved" in said) == (143, True)
 
 
-def test_an_interrupt_while_the_program_is_loaded_has_a_sentence_too() -> None:
-    """Before its own handler of signals is there: no traceback, and the exit code of an interrupt."""
-    script = (
-        "import sys\n"
-        "class Interrupted:\n"
-        "    def find_spec(self, name, *_):\n"
-        "        if name == 'spirillum.cli': raise KeyboardInterrupt\n"
-        "sys.meta_path.insert(0, Interrupted())\n"
-        "from spirillum.__main__ import main\n"
-        "main()"
-    )
-    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert (ended.returncode, ended.stderr) == (130, "spirillum: interrupted; finished files are kept\n")
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal, and no such process")
 def test_a_killed_program_leaves_no_message_of_its_semaphores() -> None:
     script = (

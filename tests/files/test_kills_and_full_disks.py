@@ -107,16 +107,20 @@ def test_an_answer_for_a_closed_stream_is_not_lost_without_a_word(more: str) -> 
     assert found.stderr.startswith("spirillum: standard output is closed, and the answer is lost; allowed: ")
 
 
-def test_an_interrupt_while_modules_are_imported_is_one_too() -> None:
+@pytest.mark.parametrize(
+    ("entry", "interrupted"), [("spirillum.__main__", "spirillum.cli"), ("spirillum.cli", "spirillum.cli.app")]
+)
+def test_an_interrupt_while_modules_are_imported_is_one_too(entry: str, interrupted: str) -> None:
+    """Also before the program's own handler of signals is there: no traceback, and the exit code of an interrupt."""
     script = (
         "import os, signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job ignores it
         "class Finder:\n"
         "    def find_spec(self, name, *_):\n"
-        "        if name == 'spirillum.cli.app':\n"
+        f"        if name == '{interrupted}':\n"
         "            os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Finder())\n"
-        "from spirillum.cli import main\n"
+        f"from {entry} import main\n"
         "sys.argv = ['spirillum', '--help']\n"
         "main()\n"
     )

@@ -104,7 +104,7 @@ class Experiment:
     synthetic: bool  #: Whether the file states that its numbers are synthetic.
     outliers: tuple[Note, ...] = ()  #: Trials that are far off the others of their tail, a sentence each.
     doubts: tuple[Note, ...] = ()
-    """What is doubtful of the rows, such as copies of a trial, which do not count, a sentence each."""
+    """Notes on doubtful rows, such as copies of a trial, which do not count."""
 
     @property
     def size(self) -> int:

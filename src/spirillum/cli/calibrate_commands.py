@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -58,6 +57,7 @@ def calibrate(
     """
     from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
+    from spirillum.kernels.native import processor_count
     from spirillum.robot.arguments import set_fields
     from spirillum.swimming.preparation import AUTO
     from spirillum.swimming.released_motion import RELEASED
@@ -81,7 +81,7 @@ def calibrate(
         friction=friction,
         assume_uncertainty=_stated(assume_uncertainty or ()),
         sampling=Sampling(**request.take("sampling")),
-        workers=min(os.cpu_count() or 1, 2),
+        workers=min(2, processor_count()),
         json=json,
     )
     if not found.converged:

@@ -47,8 +47,9 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
     from spirillum.envelope import with_notes_last
     from spirillum.robot.load import inherited, robot_answer
 
-    answer = robot_answer(loaded_robot(robot, settings))
-    renderer.show(with_notes_last(answer, **inherited(robot, overrides_from(settings))), json=json)
+    loaded = loaded_robot(robot, settings)
+    own = inherited(robot, overrides_from(settings), loaded)
+    renderer.show(with_notes_last(robot_answer(loaded), **own), json=json)
 
 
 @robot_app.command("check", cls=NotedCommand)
@@ -64,8 +65,9 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     problems, warnings = checked(robot, overrides_from(settings))
     content = {"robot": robot, "valid": not problems, "problems": list(problems)}
     if not problems:
-        content |= inherited(robot, overrides_from(settings))
-        warnings = (*warnings, *models_without_answer(loaded_robot(robot, settings)))
+        loaded = loaded_robot(robot, settings)
+        content |= inherited(robot, overrides_from(settings), loaded)
+        warnings = (*warnings, *models_without_answer(loaded))
     renderer.show(envelope("check", content, warnings), json=json)
     if problems:
         raise typer.Exit(1)

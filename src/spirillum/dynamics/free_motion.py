@@ -52,7 +52,7 @@ class FollowedPath:
     """Position and attitude at every step of a run, from release."""
 
     steps: list[Samples] = field(default_factory=list)
-    """What is in `return_map.STEPS`, turn after turn; time, x and roll count on, and the azimuth has no jumps."""
+    """Columns of `return_map.STEPS` for each turn; time, x and roll accumulate, and the azimuth is unwrapped."""
 
     def add(self, turn: Turn) -> None:
         """Add a turn."""

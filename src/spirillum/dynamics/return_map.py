@@ -33,13 +33,13 @@ _COUNTED = [core.STATE_POSITION, core.STATE_ROLL, *range(core.STATE_CURRENT + 1,
 """What counts from the start of a turn."""
 
 STEPS = ("time", "x", "roll", "gap", "azimuth", "pitch", "yaw", "contact_force", "offset")
-"""What is noted at every step: the time, two components of the state, and what is observed of it."""
+"""Columns recorded at every step: the time, two components of the state, and quantities computed from it."""
 _OF_STATE = [core.STATE_POSITION, core.STATE_ROLL]
 _SEEN = [
     *(core.SEEN_FILM, core.SEEN_AZIMUTH, core.SEEN_PITCH, core.SEEN_YAW),
     *(core.SEEN_CONTACT_FORCE, core.SEEN_OFFSET),
 ]
-"""What is observed in the order of `STEPS`; azimuth between -pi and pi."""
+"""Places of the computed quantities, in the order of `STEPS`; azimuth between -pi and pi."""
 
 _SIZES = np.array([1.0, 0.1, 100.0, 1.0])
 """Weights of azimuth (rad), logarithm of the gap, pitch (rad) and yaw (rad) in the size of a change."""

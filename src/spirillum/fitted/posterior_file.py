@@ -71,7 +71,7 @@ class _OfTail(_Table):
 
     @property
     def sizes(self) -> tuple[float, float, float]:
-        """What tells a tail in its channel apart, m."""
+        """Diameter of the channel, wavelength and amplitude, which identify a tail in its channel, m."""
         return self.channel_diameter, self.wavelength, self.amplitude
 
 
@@ -92,7 +92,7 @@ _Quantity = Literal["advance", "turning", "motor_rate"]
 
 
 class ObservedTail(_OfTail):
-    """What was observed of a robot."""
+    """Observations of a robot."""
 
     tail_rate: _Number | None = None
     seen: dict[_Quantity, _Seen]
@@ -111,7 +111,7 @@ class _Robot(_Table):
 
 
 class _Fitted(_Table):
-    """What a posterior was fitted to."""
+    """Model, robots and observations of a posterior."""
 
     model: Annotated[str, AfterValidator(_fitted_model)]
     observations: _Names
@@ -157,7 +157,7 @@ class PosteriorFile(_Fitted):
     error: Mapping[str, Samples]  #: Relative error of a trial, quantity to (draws,).
 
     def measured(self, robot: Robot) -> ObservedTail | None:
-        """What was observed of a robot; None if it was not."""
+        """Return the observations of a robot; None without any."""
         diameter = robot.channel.diameter if robot.channel else np.inf
         own = (diameter, robot.tail.wavelength, robot.tail.amplitude, robot.body.diameter, robot.body.length)
         alike = (tail for tail in self.tails if np.allclose(own, (*tail.sizes, *self.body), rtol=1e-6, atol=0.0))

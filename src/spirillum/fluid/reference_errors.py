@@ -50,7 +50,7 @@ SPEED_ERRORS = {"rft": 21, "sbt": 31}
 """Errors of the speed of the reference robot, percent: the paper's tail behind a capsule, in unbounded fluid."""
 WITHOUT_INTERACTION = 14  #: Error of that speed, percent, from leaving out the flow between body and tail alone.
 STATED = {row["of"]: row["error"].format(interaction=WITHOUT_INTERACTION) for row in rows_of("fluid/stated_errors.csv")}
-"""What models neglect, and what it costs, in words, by model and by its options."""
+"""Neglected effects and their errors, as text, by model and by its options."""
 
 
 def validation_note(batch: RobotBatch, errors: Mapping[tuple[float, float], TailError]) -> str:

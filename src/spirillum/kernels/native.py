@@ -54,19 +54,20 @@ __all__ = [
     "UInt8",
     "in_one_thread",
     "native",
+    "processor_count",
     "rows_in_one_thread",
     "run_together",
     "thread_count",
 ]
 
 
-def _processors() -> int:
+def processor_count() -> int:
     """Return how many processors this process may use, as in a container or a job of a cluster."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 _SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_bool}
-_THREADS = int(os.environ.get("OMP_NUM_THREADS") or 0) or _processors()
+_THREADS = int(os.environ.get("OMP_NUM_THREADS") or 0) or processor_count()
 _SHARES = 4  # Shares of the rows for each thread: some rows take longer than others.
 
 _alone: ContextVar[bool] = ContextVar("alone", default=False)

@@ -73,7 +73,7 @@ def stored_study(
             _write_regions(_Work(loaded, observed, plan, folder), missing, pool, on_progress, estimate)
         if outcome is None:
             kept = [_note_of(folder / plan.note(region)) for region in plan.layout.regions()]
-            warnings = [*warnings_of(loaded), *(() if observed is None else observed.notes)]
+            warnings = warnings_of(loaded, observed)
             warnings += summed((caution for note in kept for caution in note.cautions), loaded.count)
             notes = note_attributes(dict.fromkeys([*warnings, *warnings_of_calibrations(loaded)]))
             outcome = _Outcome(**notes, unanswered=sum(note.unanswered for note in kept))

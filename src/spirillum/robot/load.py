@@ -363,13 +363,13 @@ def robot_answer(robot: Robot) -> dict[str, Any]:
     return envelope("robot", content, robot.warnings)
 
 
-def inherited(robot: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the base of a robot file and the deciding fields that it takes from it; empty without a base."""
+def inherited(robot: str, overrides: Mapping[str, Any], loaded: Robot) -> dict[str, Any]:
+    """Return the base of a robot file and the deciding fields that its robot takes from it; empty without a base."""
     table, _ = raw_table(robot)
     if robot in shipped_robots() or (base := table.get("extends")) is None:
         return {}
     own = _touched(table).union(*(_touched(_nested(path, value)) for path, value in overrides.items()))
-    found = field_values(load(robot, **overrides))
+    found = field_values(loaded)
     there = {item.path: quantity(item.value, item.unit) for item in found if item.unit and item.value is not None}
     taken = {path: there[path] for path in _DECIDING if path in there and path not in own}
     return {"inherited": {"from": str(base), "fields": taken}} if taken else {}

@@ -77,7 +77,7 @@ WINDOWS = ("three turns", "whole run")
 READ = (*FACTORS, "window")  #: What differs between the readings of a robot.
 AT_RUNS = (*MOVING, "azimuth", "contact_share")  #: Quantities of each run and window.
 INFERRED = ("effective_friction", "body_drag_factor", "modelled_forward_velocity", "modelled_body_rotation_rate")
-"""What the paper's models make of the rates of a run."""
+"""Quantities that the paper's models give at the rates of a run."""
 INFERRED_BY = ("sbt", "rft")  #: The paper's models, each with the robot's own calibration.
 _SAMPLES_PER_TURN = 40
 
@@ -189,7 +189,7 @@ def _observe(run: xr.Dataset, begin: float, end: float) -> dict[str, float]:
 
 
 def inferred(robot: Robot, seen: Part) -> Part:
-    """What the paper's models make of observed rates, (..., models)."""
+    """Quantities that the paper's models give at observed rates, (..., models)."""
     # B_eff follows from (18) with the hydrodynamic torque of the model at the observed rates of tail and motor, as the
     # paper infers it; speed and body rate are the model's at the observed tail rate. The factor on the drag of the
     # isolated body is that with which the axial balance (15) gives the observed speed at the observed tail rate.

@@ -172,8 +172,7 @@ def computed_study(
 
     answers, band = answered(ModelTask), answered(BandTask)
     beside = BesideModels(answered(ReleaseTask), answered(SettledTask), answered(HeldTask), answered(TrialTask))
-    warnings = warnings_of(loaded)
-    warnings += [] if observed is None else observed.notes
+    warnings = warnings_of(loaded, observed)
     warnings += [settled_basis(loaded.study.contact)] if beside.settled else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += missing_pose_notes(band)
@@ -216,8 +215,8 @@ def _worth(missing: Sequence[StudyTask], pool: WorkerPool) -> WorkerPool:
     return WorkerPool() if short and pool.cluster is None else pool
 
 
-def warnings_of(loaded: LoadedStudy) -> list[Note]:
-    """What to be careful about in the question."""
+def warnings_of(loaded: LoadedStudy, observed: ObservedArrays | None) -> list[Note]:
+    """Notes on the robots, models, fit and observations of a study."""
     warnings = _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
         warnings.append(Note.named("friction-unset"))
@@ -233,7 +232,8 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
         warnings += loaded.fit.tails_warnings([loaded.robot_at(index) for index in range(loaded.count)])
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
-    return warnings + uneven_models(loaded.robots, models, factors)
+    warnings += uneven_models(loaded.robots, models, factors)
+    return [*warnings, *(() if observed is None else observed.notes)]
 
 
 def _pose_notes(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:

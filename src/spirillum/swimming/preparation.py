@@ -7,7 +7,6 @@ with a channel is predicted in its channel, by `tube`, or refused there, and a r
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import RESPONSES, STAGES, StageName, stage_of
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.native import processor_count
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note
 from spirillum.progress import Progress
@@ -176,7 +176,7 @@ class Prepared(DisplayMixin):
 
     @property
     def warnings(self) -> tuple[Note, ...]:
-        """What to be careful about, a sentence each, the worst error first."""
+        """Notes on the robot and on the errors of its table, the worst error first."""
         return (*self.robot.warnings, *(note for _, note in self.excesses))
 
     @property
@@ -223,11 +223,9 @@ class Prepared(DisplayMixin):
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
     """The answer of `spirillum prepare --json` for several robots, whom its notes name, the worst error first."""
-    content = [one.content for one in found]
     several = len({one.robot.name for one in found}) < len(found)
-    found = sorted(found, key=lambda one: -max((excess for excess, _ in one.excesses), default=0.0))
     named: dict[str, dict[str, list[Note]]] = {}
-    for one in found:
+    for one in sorted(found, key=lambda one: -max((excess for excess, _ in one.excesses), default=0.0)):
         for note in one.warnings:
             name = one.robot.with_tail if several else one.robot.name
             named.setdefault(note.code, {}).setdefault(name, []).append(note)
@@ -236,7 +234,7 @@ def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
         first, *others = [note.prefixed(f"{name}: ") for name, own in robots.items() for note in own]
         more = f" (and {len(robots) - 1} more of {len(found)} robots: --notes)" if len(robots) > 1 else ""
         notes += [Note(first.code, f"{first}{more}", first.fields), *others]
-    return envelope("preparations", {"robots": content}, notes)
+    return envelope("preparations", {"robots": [one.content for one in found]}, notes)
 
 
 def prepare(
@@ -323,7 +321,7 @@ def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
 
 
 _MOST_WORKERS = 64
-_WORKERS = min(2, os.cpu_count() or 1)  # Processes that make a table which another request needs.
+_WORKERS = min(2, processor_count())  # Processes that make a table which another request needs.
 
 
 def check_usual_resolution(options: ModelOptions) -> None:

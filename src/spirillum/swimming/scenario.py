@@ -31,12 +31,12 @@ NO_WEIGHT = Note.named("no-masses")  #: Caution of a free motion of a robot whos
 
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
-    """What has to hold for the answer to be accurate; each broken one is a warning."""
+    """Return the limits of an accurate answer; each one that is exceeded is a warning."""
     return [*model.cautions(batch), *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number)]
 
 
 def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Swimming) -> list[Limit]:
-    """What has to hold for the linear film under a body that is held near the wall: the liquid does not cavitate."""
+    """Return the limits of the linear film under a body held near the wall: the liquid does not cavitate."""
     bound, channel = robot.fluid.cavitation_pressure, robot.channel
     if not model.placed or bound is None or channel is None or robot.body.diameter >= channel.diameter:
         return []
@@ -49,7 +49,7 @@ def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Sw
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[Note]:
-    """What is wrong with a robot's calibration for a model, of which one that computes the walls takes none."""
+    """Return notes on a robot's calibration for a model; a model that computes the walls takes none."""
     if find_swimmer_model(model).placed:
         return []
     entry = robot.calibration.get(model)

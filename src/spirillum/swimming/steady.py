@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, cast, get_args
 
@@ -207,22 +207,22 @@ def swim(
         _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
         for cut, block in batch.blocks(_BLOCK)
     ]
-    return replace(one_after_another(parts), warnings=_wall_notes(batch, chosen, calibrated=calibrated))
+    return one_after_another(parts, _wall_notes(batch, chosen, calibrated=calibrated))
 
 
 def _wall_notes(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool) -> tuple[Note, ...]:
-    """What a model without walls leaves out of robots in channels."""
+    """Return the note on a model without walls for robots in channels."""
     if model.placed or not np.any(np.isfinite(batch.channel_diameter)):
         return ()
     factors = calibrated and model.name in batch.calibration
     return (Note.named("factors-for-walls" if factors else "swimming-without-walls", model=model.name),)
 
 
-def one_after_another(parts: Sequence[Swimming]) -> Swimming:
-    """Several answers one after the other."""
+def one_after_another(parts: Sequence[Swimming], warnings: tuple[Note, ...] = ()) -> Swimming:
+    """Concatenate answers, and their notes unless others are given."""
     names = (*(item.name for item in STEADY), "valid")
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return Swimming(**arrays, warnings=tuple(dict.fromkeys(note for part in parts for note in part.warnings)))
+    return Swimming(**arrays, warnings=warnings or tuple(dict.fromkeys(n for part in parts for n in part.warnings)))
 
 
 def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
@@ -244,7 +244,7 @@ def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
 
 
 def find_friction_model(name: str) -> FrictionModel:
-    """The reading of that name."""
+    """Return the friction model of that name."""
     if name not in get_args(FrictionModel):
         raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionModel))}")
     return cast("FrictionModel", name)

@@ -155,7 +155,7 @@ def _unbounded(solids: Solids, sources: Sources) -> list[Samples]:
 
 
 def _screen(solids: Solids, sources: Sources) -> Samples:
-    """What the wall leaves of the velocity on solids from torques at the wires, (nodes, stations)."""
+    """Velocity on the solids from torques at the wires, including the wall's reflection, (nodes, stations)."""
     # The velocity falls off as the square of the distance, and nearly vanishes in a film at the wall: an image behind a
     # plane wall takes it away. Without it torques of a fraction of a percent would press the film under the body.
     x, rho = (values.ravel()[:, None] for values in (solids.panels.x, solids.panels.rho))

@@ -314,7 +314,7 @@ def _no_usual_step(many: Multiples) -> Flag:
 
 
 class Multiples(NamedTuple):
-    """How often which multiple of the smallest step is taken."""
+    """Count the steps by their multiple of the smallest one."""
 
     repeated: int  #: Frames that repeat the one before, and are not made up for by the next step.
     lost: int  #: Frames that were lost, but for those before which one was repeated.
