@@ -76,7 +76,9 @@ def imap_unordered(
             process.terminate()  # what they were at is lost, what was answered is not
         raise
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        # Waited for, as none of them is at work any more: the library's thread of a pool may close its pipe at the
+        # very moment in which the end of the interpreter writes to it.
+        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -95,7 +97,7 @@ def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor 
     finally:
         for process in set(multiprocessing.active_children()) - before:
             process.terminate()
-        pool.shutdown(wait=False, cancel_futures=True)
+        pool.shutdown(cancel_futures=True)
 
 
 BUSY = 1.5  #: Slowdown by other work from which on a machine counts as busy.
@@ -143,26 +145,27 @@ def _end_with_parent() -> None:
 def _start_of_processes() -> Iterator[None]:
     """Tasks are handed to the pool here, and any of them may start a process."""
     # It does not run the caller's script again, for what it does is in this package; and it never sees Ctrl-C, which a
-    # terminal sends to it too: its parent ends it. The parent sees Ctrl-C once the process has what it starts from;
-    # blocking the signal in this thread is not enough for that, as another thread may take it.
+    # terminal sends to it too: its parent ends it. The parent sees signals once the process has what it starts from;
+    # blocking them in this thread is not enough for that, as another thread may take them.
     own = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     held = hasattr(signal, "pthread_sigmask")  # not on Windows
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if held else set()
     caught: list[int] = []
-    handler = signal.getsignal(signal.SIGINT) if current_thread() is main_thread() else None
-    if handler is not None:
-        signal.signal(signal.SIGINT, lambda number, _frame: caught.append(number))
+    endings = (signal.SIGINT, signal.SIGTERM) if current_thread() is main_thread() else ()
+    handlers = {ending: handler for ending in endings if callable(handler := signal.getsignal(ending))}
+    for ending in handlers:
+        signal.signal(ending, lambda number, _frame: caught.append(number))
     try:
         yield
     finally:
         sys.modules["__main__"] = own
-        if handler is not None:
-            signal.signal(signal.SIGINT, handler)
+        for ending, handler in handlers.items():
+            signal.signal(ending, handler)
         if held:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        if caught and callable(handler):
-            handler(signal.SIGINT, None)
+        if caught:
+            handlers[signal.Signals(caught[0])](caught[0], None)
 
 
 ESTIMATE = "estimate: "  #: Prefix of a progress message that estimates the work: a command prints it on its own line.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -15,6 +17,7 @@ import pytest
 from spirillum.cli import renderer
 from spirillum.cli.progress import ProgressLines
 from spirillum.fluid.tube.progress_messages import saved_state_message
+from spirillum.worker_pool import imap_unordered
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 
@@ -74,7 +77,7 @@ def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tup
 def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: bool, number: int, code: int) -> None:
     ended, said = _ended(LONG[name], tmp_path, number, group=group)
     *before, last = [line for line in said.splitlines() if " elapsed" not in line]
-    assert ended == code
+    assert ended == code, said
     assert last.startswith("spirillum: interrupted; ")
     if name == "a run":
         assert before == ["it is at work"]
@@ -109,6 +112,28 @@ def test_a_killed_program_leaves_no_message_of_its_semaphores() -> None:
     )
     assert "leaked semaphore" in plain.stderr
     assert ours.stderr == ""
+
+
+def test_a_library_that_fails_at_its_own_end_changes_no_exit_code() -> None:
+    """As the pool of processes does where its thread closes a pipe to which the end of the interpreter writes."""
+    script = (
+        "import threading, time\n"
+        "from spirillum.cli import _exit_despite_threads\n"
+        "def fails():\n    raise OSError('handle is closed')\n"
+        "threading._register_atexit(fails)\n"
+        "threading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
+        "_exit_despite_threads(143)"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=50)
+    assert (ended.returncode, ended.stderr) == (143, "")
+
+
+def test_a_pool_that_is_given_up_leaves_no_thread() -> None:
+    """Its thread would run beside the end of the interpreter, which writes to the pipe that the thread closes."""
+    answers = imap_unordered(math.sqrt, range(40), 2)
+    next(answers)
+    answers.close()
+    assert not [thread for thread in threading.enumerate() if "Executor" in type(thread).__name__]
 
 
 def test_what_is_kept_is_counted() -> None:

@@ -68,11 +68,13 @@ def _exit_despite_threads(code: int) -> None:
     """Leave without the interpreter's own end where a thread is still at work: in compiled code that would abort it."""
     if not any(thread.daemon for thread in threading.enumerate()):
         return
-    threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001 - waits for the other threads
-    atexit._run_exitfuncs()  # noqa: SLF001 - such as those that remove temporary folders
-    for stream in (sys.stdout, sys.stderr):
-        _flushed(stream)
-    os._exit(code)
+    try:
+        threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001 - waits for the other threads
+        atexit._run_exitfuncs()  # noqa: SLF001 - such as those that remove temporary folders
+        for stream in (sys.stdout, sys.stderr):
+            _flushed(stream)
+    finally:  # a library that fails at its own end changes no exit code
+        os._exit(code)
 
 
 def _prepare() -> None:
