@@ -183,11 +183,13 @@ def test_malformed_bytes_print_nothing(served: Any, tmp_path: Path) -> None:
     requests += [b"\xff\xfe\x00 nonsense\r\n\r\n", b"GET /\xc3\x28 HTTP/1.1\r\nHost: \xff\r\n\r\n"]
     requests.append(upgrade.replace(b"/live", b"/l\xc3\x28ve"))
     requests.append(upgrade.replace(b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n", b""))
-    for request in requests:
-        with socket.create_connection(address, timeout=5.0) as client:
+    with ExitStack() as stack:
+        clients = [stack.enter_context(socket.create_connection(address, timeout=5.0)) for _ in requests]
+        for client, request in zip(clients, requests, strict=True):
             client.sendall(request)
+        end = time.monotonic() + 1.0  # what is not refused goes on with pictures of the robot
+        for client in clients:
             client.settimeout(0.3)
-            end = time.monotonic() + 1.0  # what is not refused goes on with pictures of the robot
             with suppress(OSError):
                 while client.recv(65536) and time.monotonic() < end:
                     pass
