@@ -60,7 +60,7 @@ class Summary:
 
 
 def summary_of(trials: Sequence[Trial]) -> Summary:
-    """Means over trials with Student's t intervals; that of a single trial is its own. A copy of a trial is none."""
+    """Means over trials, see `mean_with_interval`; that of a single trial is its own. A copy of a trial is none."""
     # The uncertainty of the scale is common to all trials: averaging does not reduce it.
     trials = [trial for trial in trials if not any(flag.name == _COPY for flag in trial.flags)]
     shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
@@ -78,16 +78,21 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
         return replace(first, reason=first.reason or "no trial measured it")
     if len(measured) == 1:
         return measured[0]
-    mean = mean_with_interval([item.value for item in measured], LEVEL)
-    reach = mean.half_width
-    if name in _LENGTHS:
-        reach = math.hypot(reach, NORMAL * shared * mean.value)
+    common = NORMAL * shared if name in _LENGTHS else 0.0
+    own = [_independent(item, common * item.value) for item in measured]
+    mean = mean_with_interval([item.value for item in measured], LEVEL, own)
+    reach = math.hypot(mean.half_width, common * mean.value)
     if name in WOBBLES:  # the error of tracking is common to all trials
         reach = max(reach, float(np.mean([item.high - item.value for item in measured])))
     low = mean.value - reach
     if name in WOBBLES:
         low = max(low, 0.0)  # an amplitude
     return Measured(mean.value, low, mean.value + reach, measured[0].unit)
+
+
+def _independent(item: Measured, common: float) -> float:
+    """Half width of an interval without an error that is common to all trials."""
+    return math.sqrt(max((0.5 * (item.high - item.low)) ** 2 - common**2, 0.0))
 
 
 def compared(trials: Sequence[Trial]) -> list[Trial]:
@@ -147,10 +152,8 @@ class Measurement(DisplayMixin):
             found.append(Note("intervals-incomplete", words))
         two = [name for name in RATE_NAMES if self.summary.counts.get(name) == 2]
         if two:
-            words = (
-                "means over two trials: one difference gives their intervals, which may be several times too wide or "
-            )
-            found.append(Note("intervals-incomplete", f"{words}too narrow; measure more trials", two))
+            words = "means over two trials: one difference gives their intervals, which may be several times too wide"
+            found.append(Note("intervals-incomplete", f"{words}; measure more trials", two))
         unlike = [name for name in RATE_NAMES if _differ([trial.quantities[name] for trial in self.trials])]
         if unlike:
             words = f"trials differ by over a quarter in {' and '.join(unlike[:2]).replace('_', ' ')}"

@@ -245,7 +245,8 @@ def _observed(items: Sequence[ObservationRow]) -> RobotObservations:
         return RobotObservations(
             *(Mean(column[0], w, only.trials) for column, w in zip(columns, only.intervals, strict=True))
         )
-    return RobotObservations(*(mean_with_interval(column) for column in columns))
+    own = zip(*(item.intervals for item in items), strict=True)
+    return RobotObservations(*(mean_with_interval(c, within=w) for c, w in zip(columns, own, strict=True)))
 
 
 _TABLES = {".csv": "an observations file"}

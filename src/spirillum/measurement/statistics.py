@@ -40,17 +40,30 @@ def student_t(at: Samples, free: float) -> Samples:
     return np.asarray(stdtr(free, at))
 
 
-def mean_with_interval(values: Sequence[float], level: float = 0.95) -> Mean:
-    """Mean and Student-t interval of independent trials."""
+def mean_with_interval(values: Sequence[float], level: float = 0.95, within: Sequence[float] = ()) -> Mean:
+    """Mean of independent trials and its interval: Student's t of their scatter, at least what their own errors leave.
+
+    Two trials often agree by chance, which makes none of them more accurate: as with Birge's ratio (Phys. Rev. 40, 207,
+    1932), scatter widens the interval that the trials' own errors give, and never narrows it.
+
+    Args:
+        values: a value of each trial, (n,); NaN where it was not measured.
+        level: confidence level.
+        within: half width of each trial's own interval at that level, (n,), by errors that are independent between
+            trials; NaN where unknown.
+    """
     measured = np.asarray(values, dtype=float)
-    measured = measured[~np.isnan(measured)]
+    known = ~np.isnan(measured)
+    own = float(np.sqrt(np.nansum(np.square(np.asarray(within, dtype=float)[known])))) if len(within) else 0.0
+    measured = measured[known]
     count = measured.size
     if count == 0:
         return Mean(float("nan"), float("nan"), 0)
     if count == 1:
         return Mean(float(measured[0]), float("nan"), 1)
     spread = float(measured.std(ddof=1)) / np.sqrt(count)
-    return Mean(float(measured.mean()), student_t_quantile(0.5 + 0.5 * level, count - 1) * spread, count)
+    reach = student_t_quantile(0.5 + 0.5 * level, count - 1) * spread
+    return Mean(float(measured.mean()), max(reach, own / count), count)
 
 
 PIXEL_ERROR = 0.03  #: Least expected amplitude of periodic errors of the position, by angles or the pixel grid, pixels.
