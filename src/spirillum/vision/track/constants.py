@@ -158,6 +158,9 @@ class IdentityConstants:
     """Share on which the tail has to be read then, and on which it shows where the nose is.
 
     It was 0.83 and more on rendered videos of a hundred robots, 0.52 on one at half the size."""
+    next_size: float = 0.087
+    """Logarithm of the fitted size over the one looked for, beyond which the robot is looked for again at the former:
+    the distance between two candidate sizes."""
 
 
 @dataclass(frozen=True)

@@ -126,12 +126,16 @@ def _at_another_size(
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
         least = DETECTION.clearness if half else SIZE.clearness
-        size = best_other_size(stated, images, still, least, about)
-        if size is not None:
+        factor = best_other_size(stated, images, still, least, about)
+        sizes = [] if factor is None else [about * factor]
+        for size in sizes:
             with suppress(InputError):
-                other = identified_at(name, setup, resized(stated, about * size), frames, still, about * size)
+                other = identified_at(name, setup, resized(stated, size), frames, still, size)
                 if other.robot and (other.whole or not half):
                     return other
+                # A part of the body, up to its seal, may look like a smaller one: its tail is looked for from there.
+                if len(sizes) == 1 and abs(np.log(other.size / size)) > IDENTITY.next_size:
+                    sizes.append(other.size)
     return None
 
 
