@@ -1,6 +1,6 @@
 """List the tests of a module: those whose files import it, and those that reach it through one other module.
 
-python tools/find_tests.py spirillum.swimming.drives     # or src/spirillum/swimming/drives.py
+python tools/find_tests.py spirillum.swimming.balance     # or src/spirillum/swimming/balance.py
 python tools/find_tests.py                              # all modules, with the number of their test files
 """
 

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from spirillum import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.placement import Placement
-from spirillum.swimming.drives import winding_resistance
+from spirillum.swimming.balance import winding_resistance
 from spirillum.swimming.steady import swim
 from spirillum.units import Hz
 

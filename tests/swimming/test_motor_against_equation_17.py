@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize.elementwise import find_root
 
 from spirillum.errors import InputError
-from spirillum.swimming.drives import battery_voltage, run_time, steady_current, winding_resistance
+from spirillum.swimming.balance import battery_voltage, run_time, steady_current, winding_resistance
 
 
 def table_ii_resistance(current: np.ndarray) -> np.ndarray:

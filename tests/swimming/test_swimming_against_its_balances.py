@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.swimming.drives import battery_voltage, winding_resistance
+from spirillum.swimming.balance import battery_voltage, winding_resistance
 from spirillum.swimming.steady import STEADY, swim
 from spirillum.units import Hz
 

@@ -10,7 +10,7 @@ import spirillum as sp
 from spirillum.kernels.core import curve_torques
 from spirillum.robot.robot import robot_text
 from spirillum.robot.tables import TorqueCurve
-from spirillum.swimming.drives import packed_curve
+from spirillum.swimming.balance import packed_curve
 
 WIDE = "biorob2012-wide"
 RATES, TORQUES = ["0 Hz", "2 Hz", "5 Hz"], ["0.2 mN m", "0.18 mN m", "0 N m"]

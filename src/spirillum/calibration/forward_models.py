@@ -40,10 +40,10 @@ from spirillum.swimming.balance import (
     force_free,
     friction_torques,
     rates_per_torque,
+    steady_current,
     with_body_factors,
 )
 from spirillum.swimming.band import band_poses
-from spirillum.swimming.drives import steady_current
 from spirillum.swimming.dry_friction import weights_in_fluid, with_dry_friction
 from spirillum.swimming.preparation import (
     WALLED,

@@ -39,8 +39,13 @@ from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
-from spirillum.swimming.drives import packed_curve, winding_resistance
+from spirillum.swimming.balance import (
+    coasting_rates,
+    friction_torques,
+    packed_curve,
+    rates_per_torque,
+    winding_resistance,
+)
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.reynolds import (
     body_reynolds,

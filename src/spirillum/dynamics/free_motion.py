@@ -31,7 +31,7 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.drives import current_at
+from spirillum.swimming.balance import current_at
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import prepared, table_for
 from spirillum.swimming.released_motion import State, SteadyState

@@ -17,7 +17,7 @@ from spirillum.dynamics.timing import Switch
 from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
-from spirillum.swimming.drives import battery_voltage, winding_resistance
+from spirillum.swimming.balance import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
 from spirillum.version import versions
 

@@ -1,6 +1,6 @@
 """A rotating magnetic field: its rate, axis and strength over time, and one-piece swimmers against its rate.
 
-Held to the axis about which the field turns, the answer is a closed form (see `spirillum.swimming.drives`). A free
+Held to the axis about which the field turns, the answer is a closed form (see `spirillum.swimming.balance`). A free
 robot finds its own attitude: at low rates it may turn about a short axis or wobble, at higher ones its axis comes
 near that of the field and it swims as a corkscrew, until the field turns faster than it can follow (K. I. Morozov and
 A. M. Leshansky, Nanoscale 6:1580, 2014; Y. Man and E. Lauga, Phys. Fluids 25:071904, 2013). Here every rate is a run

@@ -23,8 +23,7 @@ from spirillum.fluid.tube.library import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.balance import friction_torques
-from spirillum.swimming.drives import battery_voltage, current_at, run_time, steady_current
+from spirillum.swimming.balance import battery_voltage, current_at, friction_torques, run_time, steady_current
 from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import (

@@ -23,8 +23,19 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.robot import STANDARD_GRAVITY
 from spirillum.robot.tables import FrictionModel
-from spirillum.swimming.balance import TorqueBalance, force_free, joined, released, with_body_factors
-from spirillum.swimming.drives import DriveState, at_rate, battery_voltage, driven, one_piece, run_time
+from spirillum.swimming.balance import (
+    DriveState,
+    TorqueBalance,
+    at_rate,
+    battery_voltage,
+    driven,
+    force_free,
+    joined,
+    one_piece,
+    released,
+    run_time,
+    with_body_factors,
+)
 from spirillum.swimming.released_motion import Motion, Screw, check_full, motion_of
 from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
 
