@@ -207,7 +207,7 @@ def derived_quantities() -> str:
 
 def quantities() -> str:
     """The quantities of a prediction."""
-    from spirillum.swimming.steady import STEADY
+    from spirillum.swimming.motions import STEADY
 
     return items((f"`{item.name}`", item.unit, item.meaning) for item in STEADY)
 
@@ -299,7 +299,7 @@ def _common(names: Sequence[str]) -> str:
 
 def _all_or(found: Sequence[str]) -> str:
     """Names of quantities of `predict`, or that it is all of them."""
-    from spirillum.swimming.steady import STEADY
+    from spirillum.swimming.motions import STEADY
 
     return "all quantities" if len(found) == len(STEADY) else ", ".join(found)
 
@@ -310,7 +310,7 @@ _PREDICTED = ("_at_observed_rate", "_at_assumed_rate", "_held")
 
 def _pattern(row: Sequence[str], over: str) -> str:
     """How a variable is named after a quantity of `predict`, listed on the same page; empty if it is not."""
-    from spirillum.swimming.steady import STEADY
+    from spirillum.swimming.motions import STEADY
 
     suffix = next((end for end in _PREDICTED if row[0].endswith(f"{end}`")), "")
     name = row[0].strip("`").removesuffix(suffix)

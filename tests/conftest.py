@@ -221,6 +221,7 @@ def walled(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A model with made-up walls and a made-up imposed flow, known by its name: its truth is linear algebra."""
     from spirillum.envelope import quantity
     from spirillum.fluid.closed.rft import Rft
+    from spirillum.fluid.model import AxialFlow
     from spirillum.fluid.registry import MODELS, SWIMMER_MODELS
     from spirillum.robot.limits import Limit
 
@@ -239,11 +240,9 @@ def walled(monkeypatch: pytest.MonkeyPatch) -> Any:
         def axial(self, batch: Any) -> np.ndarray:
             return super().axial(batch) + _WALLS
 
-        def axial_load(self, batch: Any) -> np.ndarray:
-            return (batch.placement.flow or 0.0) * _WRENCH_PER_FLOW
-
-        def mean_flow(self, batch: Any) -> np.ndarray:
-            return np.array([[*_PLUG, 0.7 * (batch.placement.flow or 0.0)]])
+        def axial_flow(self, batch: Any) -> AxialFlow:
+            flow = batch.placement.flow or 0.0
+            return AxialFlow(self.axial(batch), flow * _WRENCH_PER_FLOW, np.array([[*_PLUG, 0.7 * flow]]))
 
         def placement_of(self, batch: Any) -> dict[str, Any]:
             place = batch.placement

@@ -10,7 +10,7 @@ import pytest
 import spirillum as sp
 from spirillum.papers import biorob2012
 from spirillum.quantities import QUANTITIES
-from spirillum.swimming.steady import Swimming
+from spirillum.swimming.motions import Swimming
 from spirillum.units import _registry, shown_in
 
 PARTS = ("mean_", "held_", "largest_", "least_", "modelled_")

@@ -65,11 +65,11 @@ from .robot.load import load as load
 from .robot.model_options import Resolution as Resolution
 from .robot.placement import Placement as Placement
 from .robot.robot import Robot as Robot
+from .swimming.motions import Swimming as Swimming
 from .swimming.prediction import Prediction as Prediction
 from .swimming.preparation import Prepared as Prepared
 from .swimming.preparation import prepare as prepare
 from .swimming.preparation import prepare_all as prepare_all
-from .swimming.steady import Swimming as Swimming
 from .swimming.steady import swim as swim
 from .view.figures.plot import Plot as Plot
 from .view.figures.plot import plot as plot

@@ -13,7 +13,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.intervals import intervals_of
-from spirillum.swimming.steady import STEADY
+from spirillum.swimming.motions import STEADY
 
 WIDE = "biorob2012-wide"
 NAMES = [item.name for item in STEADY]

@@ -8,7 +8,7 @@ import pytest
 import spirillum as sp
 from spirillum.calibration.fit import fit_model
 from spirillum.errors import InputError
-from spirillum.swimming.released_motion import ReleasedMotion
+from spirillum.swimming.motions import ReleasedMotion
 
 HEADER = (
     "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz,motor_rate_Hz"

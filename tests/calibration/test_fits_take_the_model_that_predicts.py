@@ -11,7 +11,7 @@ import pytest
 import spirillum as sp
 from spirillum.calibration.parameters import check_not_set
 from spirillum.swimming.intervals import OF_TORQUE, knows_torque, without_torque
-from spirillum.swimming.steady import Intervals
+from spirillum.swimming.motions import Intervals
 
 PLANTED = 8e-6
 MINE: Mapping[str, Any] = {

@@ -20,8 +20,8 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.swimming.balance import joined
-from spirillum.swimming.dry_friction import swim_on_floor, weights_in_fluid, with_dry_friction
 from spirillum.swimming.sampled_resistance import TubeResistance
+from spirillum.swimming.steady import swim_on_floor, weights_in_fluid, with_dry_friction
 from synthetic_experiments import SHORT
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"

@@ -22,7 +22,7 @@ from spirillum.dynamics.trial import (
 )
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.robot.links import links_of
-from spirillum.swimming.released_motion import ReleasedMotion
+from spirillum.swimming.motions import ReleasedMotion
 
 WIDE = sp.load("biorob2012-wide")
 NOTHING = dict.fromkeys(("wait", "roughness", "friction_coefficient"))

@@ -24,8 +24,8 @@ from spirillum.errors import InputError
 from spirillum.kernels import core
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
+from spirillum.swimming.motions import LINKS
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.released_motion import LINKS
 from spirillum.swimming.steady import calibrated_resistance
 
 LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body

@@ -10,7 +10,7 @@ import pytest
 from spirillum.dynamics.free_motion import FollowedPath, _around
 from spirillum.dynamics.return_map import STEPS, Turn
 from spirillum.kernels import core
-from spirillum.swimming.released_motion import State, SteadyState
+from spirillum.swimming.motions import State, SteadyState
 
 
 @pytest.mark.parametrize(

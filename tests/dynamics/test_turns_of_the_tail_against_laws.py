@@ -13,8 +13,8 @@ from spirillum.dynamics.release import state_at_release
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
 from spirillum.dynamics.tube_robot import Surroundings, tube_robot
 from spirillum.robot.placement import Placement
+from spirillum.swimming.motions import LINKS
 from spirillum.swimming.prediction import predict
-from spirillum.swimming.released_motion import LINKS
 from spirillum.swimming.steady import calibrated_resistance
 
 LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body

@@ -16,7 +16,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import TubePose
 from spirillum.swimming.band import TOLERANCE, at_pose, band_poses, left_open
-from spirillum.swimming.steady import Swimming
+from spirillum.swimming.motions import Swimming
 
 WIDE = "biorob2012-wide"
 RADIUS = 20e-3

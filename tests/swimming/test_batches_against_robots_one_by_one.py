@@ -10,7 +10,8 @@ from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.swimming.steady import STEADY, requirements, swim
+from spirillum.swimming.motions import STEADY
+from spirillum.swimming.steady import requirements, swim
 
 BLOCK = 1 << 15
 WAVELENGTHS = np.array([10e-3, 15e-3, 20e-3, 25e-3])

@@ -12,7 +12,7 @@ from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.timing import Switch
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
-from spirillum.swimming.released_motion import LINKS
+from spirillum.swimming.motions import LINKS
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 

@@ -15,7 +15,7 @@ from spirillum import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.placement import Placement
 from spirillum.swimming.balance import winding_resistance
-from spirillum.swimming.steady import swim
+from spirillum.swimming.steady import swim, swim_on_floor
 from spirillum.units import Hz
 
 K_M, K_B, B_M = 0.00045, 0.004, 7e-7  # Table II
@@ -53,7 +53,7 @@ def friction_matrix(reading: str, effective: float = B) -> np.ndarray:
 
 def rows(model: SwimmerModel, batch: Any, friction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Force row, body row, rotor row: matrix (U, Omega, omega, tau) = right-hand side."""
-    r, load = model.axial(batch)[0], model.axial_load(batch)[0]
+    r, load = (part[0] for part in model.axial_flow(batch)[:2])
     by_u, by_body, by_tail = r[:, 0] + r[:, 2], r[:, 1], r[:, 3]
     matrix = np.zeros((3, 4))
     for row, entries in enumerate(((0, 2), (1,), (3,))):
@@ -99,7 +99,8 @@ def check(found: Any, U: float, Omega: float, omega: float, **more: float) -> No
 
 def rotor_torque(model: SwimmerModel, batch: Any, V: np.ndarray) -> float:
     """T_h: what turns the rotor against the fluid."""
-    return float(model.axial(batch)[0][3] @ V - model.axial_load(batch)[0][3])
+    found = model.axial_flow(batch)
+    return float(found.resistance[0][3] @ V - found.load[0][3])
 
 
 @pytest.mark.parametrize("flow", FLOWS)
@@ -215,7 +216,7 @@ def test_one_piece(placed: Callable[..., Any], walled: SwimmerModel, flow: float
     number = value if kind == "torque" else 1e5 * value
     unit = "N m" if kind == "torque" else "rad/s"
     batch = placed(flow, drive={"kind": kind, kind: f"{number} {unit}", "joint": "fixed", "duty": 1.0})
-    r, load = walled.axial(batch)[0], walled.axial_load(batch)[0]
+    r, load = (part[0] for part in walled.axial_flow(batch)[:2])
     both = np.kron([[1.0, 1.0]], np.eye(2))  # wrench on the whole
     whole, pull = both @ r @ both.T, both @ load
     scale = np.array([1.0, 1e-4])
@@ -255,7 +256,10 @@ def test_uniform_stream_only_carries_the_robot(
     still, stream = placed(None, **fields), placed(2e-3, **fields)
     before = swim(still, walled, friction=reading)
     push = np.array([2e-3, 0.0, 2e-3, 0.0])
-    monkeypatch.setattr(type(walled), "axial_load", lambda self, batch: self.axial(batch) @ push)
+    known = type(walled).axial_flow
+    monkeypatch.setattr(
+        type(walled), "axial_flow", lambda self, batch: known(self, batch)._replace(load=self.axial(batch) @ push)
+    )
     after = swim(stream, walled, friction=reading)
     assert first(after, "forward_velocity") == pytest.approx(first(before, "forward_velocity") + 2e-3, rel=1e-12)
     for name in ("body_rotation_rate", "tail_rotation_rate", "tail_torque", "shaft_power", "dissipated_power"):
@@ -283,6 +287,16 @@ def test_batch_against_one_by_one(placed: Callable[..., Any], walled: SwimmerMod
         for name in ("forward_velocity", "motor_current", "plug_velocity", "body_rotation_rate"):
             assert getattr(together, name)[index] == pytest.approx(first(alone, name), rel=1e-13)
     assert not together.valid[2]
+
+
+def test_dry_friction_that_vanishes_changes_nothing_in_a_flow(placed: Callable[..., Any], walled: SwimmerModel) -> None:
+    """The flow pushes body and tail: both shares of its force stay where friction is added to the body."""
+    from spirillum import load
+
+    rates = {"tail_rate": np.array([1.2 * Hz]), "friction": "none"}
+    free, rubbed = (swim_on_floor(placed(2e-3), walled, [load("biorob2012-wide")], mu, **rates) for mu in (0.0, 1e-14))
+    for name in ("forward_velocity", "body_rotation_rate", "tail_torque", "plug_velocity"):
+        assert first(rubbed, name) == pytest.approx(first(free, name), rel=1e-6), name
 
 
 def test_run_in_time_refuses_a_flow(walled: SwimmerModel) -> None:

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.swimming.balance import battery_voltage, winding_resistance
-from spirillum.swimming.steady import STEADY, swim
+from spirillum.swimming.motions import STEADY
+from spirillum.swimming.steady import swim
 from spirillum.units import Hz
 
 K_M, K_B, B_M = 0.00045, 0.004, 7e-7  # Table II

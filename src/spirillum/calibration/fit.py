@@ -54,8 +54,8 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import AUTO, IN_CHANNEL, WALLED, ModelChoice
-from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
 
 if TYPE_CHECKING:

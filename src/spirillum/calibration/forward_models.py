@@ -44,7 +44,6 @@ from spirillum.swimming.balance import (
     with_body_factors,
 )
 from spirillum.swimming.band import band_poses
-from spirillum.swimming.dry_friction import weights_in_fluid, with_dry_friction
 from spirillum.swimming.preparation import (
     WALLED,
     checked_geometries,
@@ -54,6 +53,7 @@ from spirillum.swimming.preparation import (
     table_for,
 )
 from spirillum.swimming.sampled_resistance import DrawnResistance, Draws, TubeResistance
+from spirillum.swimming.steady import weights_in_fluid, with_dry_friction
 
 if TYPE_CHECKING:
     from scipy.interpolate import RBFInterpolator

@@ -37,7 +37,7 @@ from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
 from spirillum.robot.placement import gap_on_asperities
-from spirillum.swimming.released_motion import HELD, RELEASED
+from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.sampled_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
 

@@ -31,8 +31,8 @@ from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.progress import Progress
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
+from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import WALLED
-from spirillum.swimming.released_motion import HELD, RELEASED
 
 _CLEAR = 4.0  # difference of the log density, over its standard error, from which a model is better without doubt
 _PARETO = 0.7  # largest shape of the importance weights' tail at which leaving a robot out can be trusted

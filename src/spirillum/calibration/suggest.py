@@ -45,8 +45,8 @@ from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.intervals import sampled_kinematics
+from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import fitted_with, has_table
-from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.scenario import calibration_warnings
 from spirillum.swimming.steady import requirements
 

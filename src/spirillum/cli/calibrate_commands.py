@@ -59,8 +59,8 @@ def calibrate(
     from spirillum.calibration.posterior import Sampling
     from spirillum.kernels.native import processor_count
     from spirillum.robot.arguments import set_fields
+    from spirillum.swimming.motions import RELEASED
     from spirillum.swimming.preparation import AUTO
-    from spirillum.swimming.released_motion import RELEASED
 
     typed = request.typed
     if tables := [name for name in robot if name.endswith((".csv", ".parquet"))]:
@@ -138,7 +138,7 @@ def rank_models(
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import free_by_model
     from spirillum.robot.arguments import set_fields
-    from spirillum.swimming.released_motion import HELD, RELEASED
+    from spirillum.swimming.motions import HELD, RELEASED
 
     fields, answer = set_fields(overrides_from(settings)), request.typed.get("answer", HELD)
     for name, fitted in free_by_model(request.typed.get("models"), request.typed.get("free"), answer).items():

@@ -211,7 +211,7 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
 def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A progress bar, or lines, for messages as they come."""
     from spirillum.fluid.tube.progress_messages import ANNOUNCED, LEVEL, OF_A_RUN, TILTED
-    from spirillum.swimming.released_motion import SPEED_OF
+    from spirillum.swimming.motions import SPEED_OF
     from spirillum.worker_pool import ESTIMATE
 
     lines = (ANNOUNCED, ESTIMATE, LEVEL, OF_A_RUN, TILTED)

@@ -20,7 +20,7 @@ from spirillum.robot.fields import LengthOrZero, field_values
 from spirillum.robot.geometry import coil_curvature
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
-from spirillum.swimming.steady import STEADY
+from spirillum.swimming.motions import STEADY
 from spirillum.units import Kind, as_given, display_unit, in_unit, parse_option, show
 
 

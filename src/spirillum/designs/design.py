@@ -24,10 +24,11 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.motions import LEVEL, STEADY, Swimming
 from spirillum.swimming.preparation import AUTO, WALLED
 from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
 from spirillum.swimming.scenario import calibration_warnings, drive_warnings
-from spirillum.swimming.steady import LEVEL, STEADY, Swimming, find_friction_model
+from spirillum.swimming.steady import find_friction_model
 from spirillum.units import KINDS, parse_option, show
 
 _MORE_DRAWS = 4  # draws of what is stated over those of the search

@@ -19,7 +19,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
-from spirillum.swimming.steady import LEVEL, STEADY
+from spirillum.swimming.motions import LEVEL, STEADY
 
 _LANDSCAPE_POINTS = 41
 

@@ -20,8 +20,9 @@ from spirillum.quantities import Quantity
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import Swimming
 from spirillum.swimming.preparation import AUTO
-from spirillum.swimming.steady import Swimming, requirements, swim
+from spirillum.swimming.steady import requirements, swim
 
 
 class SampledRobots(NamedTuple):

@@ -19,8 +19,8 @@ from spirillum.dynamics.prediction import predict
 from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import ReleasedMotion
 from spirillum.swimming.preparation import WALLED, has_table, preparation_time, prepare_all
-from spirillum.swimming.released_motion import ReleasedMotion
 
 _GENERATIONS = 60
 _POPULATION = 12  # designs of a generation for each variable

@@ -24,10 +24,11 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
 from spirillum.swimming.intervals import intervals_over, sampled_batch
+from spirillum.swimming.motions import LEVEL, Intervals, Swimming
 from spirillum.swimming.preparation import ModelChoice, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import PosteriorFor, sampled_discrepancy
-from spirillum.swimming.steady import LEVEL, Intervals, Swimming, one_after_another
+from spirillum.swimming.steady import one_after_another
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -23,9 +23,10 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
+from spirillum.swimming.motions import STEADY, Swimming
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import check_domain, least_gap
-from spirillum.swimming.steady import STEADY, Swimming, find_friction_model, requirements
+from spirillum.swimming.steady import find_friction_model, requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:

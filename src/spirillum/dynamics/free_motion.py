@@ -32,12 +32,12 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.balance import current_at
+from spirillum.swimming.motions import State, SteadyState, Swimming
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import prepared, table_for
-from spirillum.swimming.released_motion import State, SteadyState
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
 from spirillum.swimming.scenario import NO_WEIGHT
-from spirillum.swimming.steady import Swimming, swimming_of
+from spirillum.swimming.steady import swimming_of
 from spirillum.units import show
 
 _MOST_TURNS = 300  # Turns that are followed at most.

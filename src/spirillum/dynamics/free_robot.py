@@ -36,8 +36,8 @@ from spirillum.robot.outline import profile_outline
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import friction_torques, packed_curve
+from spirillum.swimming.motions import LINKS
 from spirillum.swimming.prediction import Prediction
-from spirillum.swimming.released_motion import LINKS
 from spirillum.swimming.steady import calibrated_resistance
 
 ROUGHNESS_SHARE = 1e-4

@@ -37,9 +37,9 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import check_full
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import AUTO, choose_model, table_for
-from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, as_given, parse_option
 

@@ -34,9 +34,9 @@ from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import Swimming, check_full
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import AUTO, NO_CHANNEL, UNBOUNDED, ModelChoice
-from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import (
     body_reynolds,
     reynolds_limits,
@@ -45,7 +45,7 @@ from spirillum.swimming.reynolds import (
     tail_reynolds,
     without_reynolds_bound,
 )
-from spirillum.swimming.steady import Swimming, swim
+from spirillum.swimming.steady import swim
 from spirillum.units import KINDS, parse_option, show
 from spirillum.version import versions
 

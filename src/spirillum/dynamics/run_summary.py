@@ -14,7 +14,7 @@ from spirillum.dynamics.timing import Switch
 from spirillum.envelope import envelope, interval, quantity
 from spirillum.notes import Note, notes_in
 from spirillum.quantities import attributes
-from spirillum.swimming.released_motion import SteadyState
+from spirillum.swimming.motions import SteadyState
 
 if TYPE_CHECKING:
     import xarray as xr

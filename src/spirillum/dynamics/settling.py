@@ -35,9 +35,9 @@ from spirillum.progress import Progress
 from spirillum.quantities import in_units
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import SteadyState
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import IN_CHANNEL
-from spirillum.swimming.released_motion import SteadyState
 from spirillum.units import KINDS, parse_option
 
 _U, _SIDE, _UP, _ROLL, _JOINT = 0, 1, 2, 3, 6

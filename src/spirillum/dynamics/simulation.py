@@ -33,9 +33,9 @@ from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import check_full, motion_of
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import AUTO, table_for
-from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.swimming.steady import find_friction_model, requirements

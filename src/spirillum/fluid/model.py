@@ -9,7 +9,7 @@ definite. Where the fluid is made to flow past the robot, it adds a wrench on th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -75,6 +75,16 @@ class ResistanceModel(ABC):
         """Resistance of one of `parts` alone in the same fluid, about the origin, never calibrated."""
 
 
+class AxialFlow(NamedTuple):
+    """What the fluid does to a robot that moves along and about its axis, averaged over a turn of the tail."""
+
+    resistance: Axial
+    load: AxialLoad  #: L of an imposed flow on the robot at rest, N and N m; zero where none is imposed.
+    mean_flow: MeanFlow | None
+    """Mean velocity of the fluid through the channel, per unit (U_x, Omega_x) of body and of rotor, and at rest:
+    1, m/rad, 1, m/rad, m/s; None for a model without a channel."""
+
+
 class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
 
@@ -105,19 +115,9 @@ class SwimmerModel(ResistanceModel):
         on the tail's phase it is the average over a turn.
         """
 
-    def axial_load(self, batch: RobotBatch) -> AxialLoad:
-        """L: axial wrench (F_x, T_x of body, F_x, T_x of rotor) of an imposed flow on the robot at rest, N and N m.
-
-        Averaged over a turn of the tail, as `axial` is. Zero where no flow is imposed.
-        """
-        return np.zeros((1, 4))
-
-    def mean_flow(self, batch: RobotBatch) -> MeanFlow | None:
-        """Mean velocity of the fluid through the channel, per unit (U_x, Omega_x) of body and of rotor, and at rest.
-
-        Columns 1, m/rad, 1, m/rad, m/s; None for a model without a channel.
-        """
-        return None
+    def axial_flow(self, batch: RobotBatch) -> AxialFlow:
+        """`axial` with what a channel adds, in one evaluation; a model with walls overrides it."""
+        return AxialFlow(self.axial(batch), np.zeros((1, 4)), None)
 
     @abstractmethod
     def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:

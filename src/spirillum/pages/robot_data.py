@@ -22,8 +22,8 @@ from spirillum.units import display_unit, shown_in
 
 if TYPE_CHECKING:
     from spirillum.dynamics.plant import Snapshot
+    from spirillum.swimming.motions import ReleasedMotion
     from spirillum.swimming.prediction import Prediction
-    from spirillum.swimming.released_motion import ReleasedMotion
 
 
 _CREASE = np.radians(40.0)  # edges sharper than this stay sharp

@@ -19,8 +19,8 @@ from spirillum.pages.study_picture import StudyPicture
 from spirillum.progress import Progress
 from spirillum.robot.load import preset_names
 from spirillum.robot.robot import Robot, robot_text
+from spirillum.swimming.motions import ReleasedMotion
 from spirillum.swimming.preparation import WALLED
-from spirillum.swimming.released_motion import ReleasedMotion
 
 
 class Preparing(BackgroundJob):

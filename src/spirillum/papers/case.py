@@ -27,9 +27,10 @@ from spirillum.robot.fields import Section, field_values
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.motions import STEADY
 from spirillum.swimming.prediction import predict
 from spirillum.swimming.preparation import missing_tables
-from spirillum.swimming.steady import STEADY, swim
+from spirillum.swimming.steady import swim
 
 Provenance = Literal["text", "digitised", "deposit", "abstract", "second hand", "memory"]  #: How it was read.
 

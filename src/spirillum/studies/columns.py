@@ -26,8 +26,8 @@ from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, flag_attributes, gathered, groups
 from spirillum.swimming.band import at_pose, band_poses
+from spirillum.swimming.motions import ASSUMPTION
 from spirillum.swimming.preparation import WALLED, has_table
-from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.swimming.steady import one_after_another, requirements, swim
 from spirillum.units import show
 

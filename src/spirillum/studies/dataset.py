@@ -35,9 +35,10 @@ from spirillum.studies.released_robots import (
 from spirillum.studies.spec import LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import REASONS, ModelTask, Part, flag_attributes, gathered
+from spirillum.swimming.motions import STEADY, Swimming
 from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
 from spirillum.swimming.scenario import accuracy_limits
-from spirillum.swimming.steady import STEADY, Swimming, requirements
+from spirillum.swimming.steady import requirements
 from spirillum.version import versions
 
 if TYPE_CHECKING:

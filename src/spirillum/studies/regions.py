@@ -20,7 +20,7 @@ from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.studies.dataset import cautions, coordinates_of, labelled_answers
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays, observed_at
 from spirillum.studies.work import AT_RATES, BLOCK, WITH_INTERVALS, Indices, Part, groups, one_thread_each, tasks
-from spirillum.swimming.steady import STEADY
+from spirillum.swimming.motions import STEADY
 from spirillum.worker_pool import AHEAD, ESTIMATE, WorkerPool, memory_in_use
 
 if TYPE_CHECKING:

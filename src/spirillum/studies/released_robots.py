@@ -39,7 +39,7 @@ from spirillum.studies.spec import Contact, LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import MOVING, OneRobot, Part, flag_attributes, gathered
 from spirillum.swimming.band import steepest_pitch
-from spirillum.swimming.released_motion import State
+from spirillum.swimming.motions import State
 from spirillum.swimming.steady import swim
 from spirillum.units import show_height
 

@@ -24,7 +24,8 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays, observed_at
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
-from spirillum.swimming.steady import STEADY, Swimming, one_after_another, requirements, speed_error, swim
+from spirillum.swimming.motions import STEADY, Swimming
+from spirillum.swimming.steady import one_after_another, requirements, speed_error, swim
 
 MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
 """Quantities of every motion."""

@@ -32,7 +32,8 @@ from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
-from spirillum.swimming.steady import STEADY, Swimming, one_after_another, requirements
+from spirillum.swimming.motions import STEADY, Swimming
+from spirillum.swimming.steady import one_after_another, requirements
 from spirillum.units import show
 
 PLACES_PER_FIELD = 3  #: Gaps, and pitches at each of them.

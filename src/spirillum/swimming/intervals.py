@@ -24,7 +24,7 @@ from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import battery_voltage, current_at, friction_torques, run_time, steady_current
-from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
+from spirillum.swimming.motions import LEVEL, STEADY, Intervals, Swimming
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import (
     AxialTable,
@@ -33,7 +33,7 @@ from spirillum.swimming.sampled_resistance import (
     chebyshev_points,
     sampled_discrepancy,
 )
-from spirillum.swimming.steady import LEVEL, STEADY, Intervals, Swimming, find_friction_model
+from spirillum.swimming.steady import KnownResistance, find_friction_model, swim_on_floor
 
 OF_TORQUE = (
     "tail_torque",
@@ -185,7 +185,7 @@ def _sampled_model(
     if placement.pitch is not None or placement.eccentricity is not None:
         columns.pop("pitch", None)
     known = TubeResistance.of(own, tables)
-    load = known.load(columns, place.flow)[:, 0] if place.flow else None
+    load = np.insert(known.load(columns, place.flow)[:, 0], 2, 0.0, axis=-1) if place.flow else None
     return replace(batch, placement=place), KnownResistance(tables, known.whole(columns)[:, 0], load)
 
 

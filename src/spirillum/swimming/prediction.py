@@ -29,11 +29,20 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.band import Band, band_of
+from spirillum.swimming.motions import (
+    STEADY,
+    Intervals,
+    Motion,
+    ReleasedMotion,
+    SteadyState,
+    Swimming,
+    headline,
+    motion_of,
+)
 from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared, why_no_table
-from spirillum.swimming.released_motion import Motion, ReleasedMotion, SteadyState, motion_of
 from spirillum.swimming.sampled_resistance import PosteriorFor, posterior_for_of
 from spirillum.swimming.scenario import OtherModels, Scenario, no_band_warnings, other_models
-from spirillum.swimming.steady import STEADY, Intervals, Swimming, find_friction_model, headline
+from spirillum.swimming.steady import find_friction_model
 from spirillum.units import KINDS, parse_option
 
 

@@ -20,11 +20,10 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.band import left_open
-from spirillum.swimming.dry_friction import swim_on_floor
+from spirillum.swimming.motions import Motion, Swimming
 from spirillum.swimming.preparation import has_table, preparation_time, why_no_table
-from spirillum.swimming.released_motion import Motion
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.steady import Swimming, calibrated_balance, requirements, speed_error, swim
+from spirillum.swimming.steady import calibrated_balance, requirements, speed_error, swim, swim_on_floor
 from spirillum.units import show
 
 NO_WEIGHT = Note.named("no-masses")  #: Caution of a free motion of a robot whose masses are unknown.

@@ -1,27 +1,36 @@
-"""Steady swimming of a batch of robots: resistance and drive to speed, rates, torques and powers."""
+"""Steady swimming of a batch of robots: resistance and drive to speed, rates, torques and powers.
+
+Dry friction of a robot that rests on its asperities is an added resistance of its body. The floor carries the robot's
+weight in the fluid N through asperities at the body's lowest point, which slides along the tube at U and around it at
+a Omega, with the body's radius a. Coulomb friction acts against the sliding:
+
+    F_x = -mu_c N U/s,   T_x = -mu_c N a^2 Omega/s,   s = sqrt(U^2 + (a Omega)^2 + v_r^2),
+
+smooth below the sliding speed v_r. That is the resistance k = mu_c N/s against U and k a^2 against Omega, added to the
+body's, with k at the robot's own sliding speed. Unlike all fluid resistance it depends on how fast the tail turns. The
+film's forces across the tube are not in N: they vanish for a level robot at the lowest place of its tube.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, cast, get_args
 
 import numpy as np
 
 from spirillum.argument_validation import number_array
-from spirillum.arrays import Flags, Matrix12, PerRobot, Samples
-from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, interval, quantity
+from spirillum.arrays import Axial, AxialLoad, AxialWhole, Flags, Matrix12, MeanFlow, PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
-from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.model import AxialFlow, SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.kernels.core import contact_drag
 from spirillum.notes import Note
-from spirillum.quantities import QUANTITIES, Quantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
-from spirillum.robot.robot import STANDARD_GRAVITY
+from spirillum.robot.links import links_of
+from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import (
     DriveState,
@@ -36,104 +45,8 @@ from spirillum.swimming.balance import (
     run_time,
     with_body_factors,
 )
-from spirillum.swimming.released_motion import Motion, Screw, check_full, motion_of
+from spirillum.swimming.motions import STEADY, Motion, Screw, Swimming, check_full, motion_of
 from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
-
-LEVEL = 0.95  #: Level of the intervals.
-
-
-@dataclass(frozen=True, repr=False)
-class Swimming(DisplayMixin):
-    """Steady motion of a batch, one value for each robot, SI, rates signed about +x; NaN where not `valid`.
-
-    Units, meanings and sources stand in `spirillum.quantities`.
-    """
-
-    forward_velocity: PerRobot
-    advance_per_radian: PerRobot
-    tail_rotation_rate: PerRobot
-    body_rotation_rate: PerRobot
-    motor_rotation_rate: PerRobot
-    tail_torque: PerRobot
-    drive_torque: PerRobot
-    motor_current: PerRobot
-    battery_voltage: PerRobot
-    effective_friction: PerRobot
-    motor_residual_torque: PerRobot
-    electrical_power: PerRobot
-    shaft_power: PerRobot
-    friction_power: PerRobot
-    dissipated_power: PerRobot
-    hydrodynamic_efficiency: PerRobot
-    propulsive_power: PerRobot
-    overall_efficiency: PerRobot
-    cost_of_transport: PerRobot
-    reynolds_number: PerRobot
-    tail_reynolds_number: PerRobot
-    battery_run_time: PerRobot
-    plug_velocity: PerRobot
-    wobble_angle: PerRobot
-    path_radius: PerRobot
-    step_out_rate: PerRobot
-    phase_lag: PerRobot
-    valid: Flags
-    warnings: tuple[Note, ...] = ()  #: Of the whole batch.
-
-    def to_dict(self) -> dict[str, Any]:
-        """Median, least and largest of every quantity over the robots, as data."""
-        found = {item.name: np.asarray(getattr(self, item.name))[self.valid] for item in STEADY}
-        known = {name: column[np.isfinite(column)] for name, column in found.items()}
-        content = {
-            "robots": int(self.valid.size),
-            "valid": int(np.count_nonzero(self.valid)),
-            **{
-                name: quantity(np.median(column), QUANTITIES[name].unit, low=column.min(), high=column.max())
-                for name, column in known.items()
-                if column.size
-            },
-        }
-        return envelope("swimming", content, self.warnings)
-
-    def _display_content(self) -> tuple[Mapping[str, Any], list[str]]:
-        """See `DisplayMixin`: the quantities that matter most."""
-        answer = self.to_dict()
-        return answer, [name for name in HEADLINE if name in answer][:_SHOWN]
-
-
-STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.type == "PerRobot")
-"""The quantities of steady swimming, in their order."""
-
-
-HEADLINE: tuple[str, ...] = (
-    "forward_velocity",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "motor_current",
-    "step_out_rate",
-    "hydrodynamic_efficiency",
-    "tail_torque",
-)
-"""The quantities that matter most, most first: an answer shows the first five of them that apply."""
-_SHOWN = 5
-
-
-def headline(answer: Mapping[str, Any]) -> list[str]:
-    """Names of the five quantities of a robot's JSON that matter most."""
-    return [name for name in HEADLINE if answer[name]["value"] is not None][:_SHOWN]
-
-
-@dataclass(frozen=True)
-class Intervals:
-    """Limits of the intervals of every quantity of one robot."""
-
-    low: Mapping[str, float]
-    high: Mapping[str, float]
-    middle: Mapping[str, float]  #: Medians of the draws.
-
-    def of(self, name: str) -> dict[str, Any]:
-        """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
-        return interval(self.low[name], self.high[name], LEVEL)
-
 
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
 
@@ -145,8 +58,12 @@ def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:
 
 def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> TorqueBalance:
     """The force-free torque balance; a calibration factor f adds (f - 1) times the isolated body's drag."""
-    r = _with_factors(joined(model.axial(batch)), (0, 1), batch, model, calibrated=calibrated)
-    return force_free(r, model.axial_load(batch))
+    return _balance_of(model.axial_flow(batch), batch, model, calibrated=calibrated)
+
+
+def _balance_of(found: AxialFlow, batch: RobotBatch, model: SwimmerModel, *, calibrated: bool) -> TorqueBalance:
+    r = _with_factors(joined(found.resistance), (0, 1), batch, model, calibrated=calibrated)
+    return force_free(r, found.load)
 
 
 def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> Matrix12:
@@ -156,12 +73,12 @@ def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated:
 
 def axial_forces(batch: RobotBatch, model: SwimmerModel, motion: Swimming, *, calibrated: bool = True) -> Samples:
     """Axial force and torque of the fluid on the body, then on the rotor, in steady motion, (robots, 4), N and N m."""
-    r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
+    found = model.axial_flow(batch)
+    r = _with_factors(found.resistance, (0, 1), batch, model, calibrated=calibrated)
     rates = (motion.forward_velocity, motion.body_rotation_rate, motion.forward_velocity, motion.tail_rotation_rate)
     # Of the two forces one is drag, one thrust; they cancel, as nothing else pushes along the axis.
     force: Samples = -(r @ np.stack(rates, axis=-1)[..., None])[..., 0]
-    load = model.axial_load(batch)
-    return force + load
+    return force + found.load
 
 
 def _with_factors(
@@ -281,9 +198,10 @@ def _swim_block(
 ) -> Swimming:
     valid = batch.known & all_hold(requirements(batch, model))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        shared = None
+        shared = flow = None
         if motion == "held":
-            balance = calibrated_balance(batch, model, calibrated=calibrated)
+            found = model.axial_flow(batch)
+            balance, flow = _balance_of(found, batch, model, calibrated=calibrated), found.mean_flow
         else:
             balance, shared = released(calibrated_resistance(batch, model, calibrated=calibrated))
         if batch.joint == "fixed":
@@ -293,11 +211,11 @@ def _swim_block(
         else:
             state = at_rate(batch, balance, tail_rate, motor_rate, friction)
         screw = None if shared is None else Screw.of(shared, state.body_rate, state.tail_rate)
-        return _answer(batch, model, balance, state, screw, valid)
+        return _answer(batch, flow, balance, state, screw, valid)
 
 
 def _answer(
-    batch: RobotBatch, model: SwimmerModel, s: TorqueBalance, state: DriveState, screw: Screw | None, valid: Flags
+    batch: RobotBatch, flow: MeanFlow | None, s: TorqueBalance, state: DriveState, screw: Screw | None, valid: Flags
 ) -> Swimming:
     body_rate, tail_rate = state.body_rate, state.tail_rate
     speed = s.speed(body_rate, tail_rate) if screw is None else screw.speed
@@ -328,7 +246,7 @@ def _answer(
     }
     if screw is not None:
         known |= {"wobble_angle": screw.tilt, "path_radius": screw.radius}
-    if (flow := model.mean_flow(batch)) is not None:
+    if flow is not None:
         moved = (flow[..., 0] + flow[..., 2]) * speed + flow[..., 1] * body_rate + flow[..., 3] * tail_rate
         known["plug_velocity"] = moved + flow[..., 4]
     return swimming_of(batch, known, valid)
@@ -373,3 +291,92 @@ def swimming_of(batch: RobotBatch, known: Mapping[str, PerRobot], valid: Flags) 
     columns = {**shaped, "valid": moving}
     arrays: dict[str, Any] = {name: np.array(np.broadcast_to(value, (batch.size,))) for name, value in columns.items()}
     return Swimming(**arrays)
+
+
+_SMOOTH = 1e-4
+"""v_r over the sliding speed of a body that turns as fast as its tail, as in a run with six degrees of freedom."""
+_ROUNDS = 60
+_SETTLED = 1e-12
+_WHOLE = (0, 1, 3)
+"""Indices of U, Omega and omega in the axial form of both parts, where the force on the whole belongs to the body."""
+
+
+def weights_in_fluid(robots: Sequence[Robot]) -> PerRobot:
+    """Weight less buoyancy of whole robots, N; NaN where a mass is not known."""
+    return np.array(
+        [
+            STANDARD_GRAVITY * sum(link.mass - robot.fluid.density * link.volume for link in links_of(robot))
+            for robot in robots
+        ]
+    )
+
+
+def with_dry_friction(r: AxialWhole, force: Values, radius: Values, tail_rate: Values) -> Samples:
+    """R of whole robots, (..., 3, 3), with dry friction mu_c N at the sliding speed that the tail's rate gives."""
+    shape = np.broadcast_shapes(r.shape[:-2], *(np.shape(item) for item in (force, radius, tail_rate)))
+    full = np.broadcast_to(r, (*shape, 3, 3)).reshape(-1, 3, 3)
+    pressed, radii, rates = (np.broadcast_to(item, shape).ravel() for item in (force, radius, tail_rate))
+    drag = np.empty(len(full))
+    contact_drag(full, pressed, radii, rates, _SMOOTH, drag)
+    k, two = drag.reshape(shape), np.full(1, 2.0)
+    return with_body_factors(r, (two, two), (k, k * np.asarray(radius) ** 2))
+
+
+class KnownResistance(SwimmerModel):
+    """A model whose resistances along the axis are known beforehand, for each robot of a batch."""
+
+    parts = ()
+
+    def __init__(
+        self, model: SwimmerModel, whole: AxialWhole, load: AxialLoad | None = None, flow: MeanFlow | None = None
+    ) -> None:
+        """Answer with resistances of whole robots; `model` answers all else."""
+        self.name = model.name
+        self.placed = model.placed  # type: ignore[misc]
+        resistance = np.zeros((*whole.shape[:-2], 4, 4))
+        resistance[..., np.array(_WHOLE)[:, None], _WHOLE] = whole
+        self.model, self._known = model, AxialFlow(resistance, np.zeros((1, 4)) if load is None else load, flow)
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """See `ResistanceModel.domain`."""
+        return self.model.domain(batch)
+
+    def axial(self, batch: RobotBatch) -> Axial:  # noqa: ARG002 - one interface for all models
+        """See `SwimmerModel.axial`."""
+        return self._known.resistance
+
+    def axial_flow(self, batch: RobotBatch) -> AxialFlow:  # noqa: ARG002 - as above
+        """See `SwimmerModel.axial_flow`."""
+        return self._known
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Any:
+        """See `SwimmerModel.resistance`."""
+        return self.model.resistance(batch, phase)
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Any:
+        """See `ResistanceModel.part_matrix`."""
+        return self.model.part_matrix(batch, part, phase)
+
+
+def swim_on_floor(
+    batch: RobotBatch, model: SwimmerModel, robots: Sequence[Robot], coefficient: Values | float | None, **asked: Any
+) -> Swimming:
+    """Steady swimming with dry friction, which dissipates too, under the whole weight; free, or without, as `swim`."""
+    mu = np.zeros(1) if coefficient is None else np.atleast_1d(np.asarray(coefficient, dtype=float))
+    free = swim(batch, model, **asked)
+    if not np.any(mu > 0) or asked.get("motion") == "free":
+        return free
+    weight = weights_in_fluid(robots)
+    if batch.joint == "fixed" or not np.all(weight > 0):
+        why = "drive.joint = 'fixed'" if batch.joint == "fixed" else "a robot that has no weight in the fluid"
+        raise InputError(f"friction_coefficient = {mu[0]:.3g} with {why}; allowed: 0, or a revolute joint and a weight")
+    without = model.axial_flow(batch)
+    whole = joined(without.resistance)
+    rate, found = free.tail_rotation_rate, free
+    for _ in range(_ROUNDS):
+        rubbed = with_dry_friction(whole, mu * weight, 0.5 * batch.body_diameter, np.nan_to_num(rate))
+        found = swim(batch, KnownResistance(model, rubbed, without.load, without.mean_flow), **asked)
+        before, rate = rate, found.tail_rotation_rate
+        if not np.any(np.abs(rate - before) > _SETTLED * np.abs(rate)):
+            break
+    return found

@@ -16,8 +16,8 @@ from spirillum.progress import Progress
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.motions import ASSUMPTION, HELD, RELEASED
 from spirillum.swimming.preparation import AUTO, WALLED, choose_model
-from spirillum.swimming.released_motion import ASSUMPTION, HELD, RELEASED
 from spirillum.virtual.optics import tube_height
 from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions

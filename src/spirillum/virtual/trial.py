@@ -34,8 +34,8 @@ from spirillum.quantities import in_units
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
+from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import AUTO
-from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.units import display_unit, show
 from spirillum.version import versions
 from spirillum.virtual.artifacts import (

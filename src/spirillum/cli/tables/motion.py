@@ -35,8 +35,7 @@ from spirillum.display import fitted_words, percent, rows_of, times
 from spirillum.dynamics.run_summary import merged_events
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
-from spirillum.swimming.released_motion import ASSUMPTION, END_STATES
-from spirillum.swimming.steady import headline
+from spirillum.swimming.motions import ASSUMPTION, END_STATES, headline
 from spirillum.units import display_unit, in_unit, speed_unit
 
 

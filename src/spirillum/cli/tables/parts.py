@@ -116,7 +116,7 @@ def released_columns(answer: Answer) -> Iterator[Block]:
             names = ", ".join(name.replace("_", " ") for name in lacking if lacking[name] == reason)
             yield Detail(f"no {names} of a trial: {reason}")
     if "steady" in there and "steady" not in missing:
-        from spirillum.swimming.released_motion import END_STATES  # brings the models
+        from spirillum.swimming.motions import END_STATES  # brings the models
 
         constant = answer["steady"]["time_constant"]["value"]  # it hangs on where the approach is looked at
         after = f", approached with a time constant of {constant:.2g} s" if constant else ""
@@ -192,7 +192,7 @@ def unsteady(answer: Answer) -> Iterator[str]:
 
 def resting_pose(lying: Answer) -> Iterator[str]:
     """Final motion of a free robot, and what it rests on; its pose on request."""
-    from spirillum.swimming.released_motion import ASSUMPTION  # brings the models
+    from spirillum.swimming.motions import ASSUMPTION  # brings the models
 
     yield f"{_STATES[lying['state']].format(time=in_words(lying['followed_time']))}; {ASSUMPTION}"
     details = []

@@ -159,7 +159,6 @@ class TabledTube(Tube):
         super().__init__()
         self._tables = tables
         self._asked: tuple[RobotBatch, list[Limit]] | None = None
-        self._known: tuple[RobotBatch, tuple[Samples, Samples]] | None = None
         coarsest = min(tables.values(), key=lambda table: list(STAGES).index(table.stage), default=None)
         self.error_against = None if coarsest is None else coarsest.error_against
 
@@ -203,13 +202,7 @@ class TabledTube(Tube):
         return pose_limits(batch, part, unbounded, thinnest_gap=THINNEST_GAP, wire_film=0.0)
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
-        """Resistance, load and mean flow are asked for one after the other: those of the last batch are kept."""
-        known = self._known
-        if known is None or known[0] is not batch:
-            self._known = known = batch, self._evaluated(batch)
-        return known[1]
-
-    def _evaluated(self, batch: RobotBatch) -> tuple[Samples, Samples]:
+        """See `Tube`; from the tables' means over a turn."""
         found = np.full((batch.size, 5, 5), np.nan)
         for index in within(batch, self.domain(batch)):
             (geometry, pose), mean = seated(batch, index), np.empty((MOTIONS, MOTIONS))

@@ -21,10 +21,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.errors import MOST_MEMORY, InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
-from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.model import AxialFlow, SwimmerModel
 from spirillum.fluid.reference_errors import CHECKED, STATED, fit_clause, validation_note
 from spirillum.fluid.tube.cache import cached_or_computed, is_cached
 from spirillum.fluid.tube.confined import UnitMotions, share_basis, solve_unit_motions
@@ -258,17 +258,12 @@ class Tube(SwimmerModel):
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`: the average over `model.tube.phases` phases, ends condensed."""
-        answers, _ = self._axial(batch)
-        return answers[:, :4, :4]
+        return self.axial_flow(batch).resistance
 
-    def axial_load(self, batch: RobotBatch) -> AxialLoad:
-        """See `SwimmerModel.axial_load`."""
-        answers, _ = self._axial(batch)
-        return (batch.placement.flow or 0.0) * answers[:, :4, 4]
-
-    def mean_flow(self, batch: RobotBatch) -> MeanFlow:
-        """See `SwimmerModel.mean_flow`."""
-        return self._axial(batch)[1]
+    def axial_flow(self, batch: RobotBatch) -> AxialFlow:
+        """See `SwimmerModel.axial_flow`."""
+        answers, mean_flow = self._axial(batch)
+        return AxialFlow(answers[:, :4, :4], (batch.placement.flow or 0.0) * answers[:, :4, 4], mean_flow)
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         """R and load along the tube and about the motor axis, (n, 5, 5), and the mean flow, (n, 5)."""

@@ -18,9 +18,9 @@ from spirillum.display import percent
 from spirillum.dynamics.comparison import RELEASED_EFFECT, ModelComparison, estimated_error
 from spirillum.errors import InputError
 from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, Best, RankedRobot, StudyRanking, unit_of_ranked
+from spirillum.swimming.motions import ASSUMPTION
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import WALLED
-from spirillum.swimming.released_motion import ASSUMPTION
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Picture, Sheet, write_beside
 from spirillum.view.figures.style import (

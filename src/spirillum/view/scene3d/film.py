@@ -19,7 +19,7 @@ from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
 from spirillum.robot.robot import Robot
-from spirillum.swimming.released_motion import ASSUMPTION
+from spirillum.swimming.motions import ASSUMPTION
 from spirillum.units import display_unit, show
 from spirillum.view.figures.scene import FAINT, INK, round_length
 from spirillum.view.figures.style import COLOURS, with_micro
