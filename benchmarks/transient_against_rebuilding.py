@@ -18,7 +18,7 @@ from spirillum.dynamics.axial_robot import RUNGE_KUTTA, AxialRobot
 from spirillum.fluid.closed.rft import local_coefficients
 from spirillum.papers.biorob2012 import transient
 from spirillum.robot.batch import RobotBatch
-from spirillum.swimming.prediction import predict
+from spirillum.swimming.prediction import predict_steady
 
 INTERVALS_PER_WAVELENGTH = 100
 
@@ -55,7 +55,7 @@ def rebuilt_tail_matrix(batch: RobotBatch, phase: float) -> np.ndarray:
 def main() -> None:
     robot = sp.load("biorob2012-wide")
     batch = RobotBatch.of(robot)
-    prediction = predict(robot, model="rft")
+    prediction = predict_steady(robot, model="rft")
     axial = AxialRobot.of(prediction)
     turn = 2 * np.pi / abs(prediction.tail_rotation_rate)
     samples = np.linspace(0.0, 3 * turn, 301)

@@ -24,18 +24,21 @@ def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model in closed form for the motion, and a sphere for the flow."""
     import spirillum.fields.flow as module
     from spirillum.fluid.tube.tube import Tube
-    from spirillum.swimming.prediction import predict
+    from spirillum.robot.placement import Placement
+    from spirillum.swimming.prediction import predict_steady
     from spirillum.swimming.preparation import prepared
 
     def quick(robot: Any, **options: Any) -> Any:
         known = {"model": "sbt", "resolution": None}
         if options["model"] != "tube":
-            return predict(robot, **{**options, **known})
-        placed = prepared(robot, "tube", placement=options["placement"], resolution=options["resolution"])[2]
-        found = predict(robot, **{**options, **known, "placement": None})
+            return predict_steady(robot, **{**options, **known})
+        placed = prepared(
+            robot, "tube", placement=Placement.of(options["placement"]), resolution=options["resolution"]
+        )[2]
+        found = predict_steady(robot, **{**options, **known, "placement": None})
         return replace(found, model=Tube(), batch=placed)
 
-    monkeypatch.setattr(module, "predict", quick)
+    monkeypatch.setattr(module, "predict_steady", quick)
     monkeypatch.setattr(module, "tube_flow_field", lambda *_: sphere)
     monkeypatch.setattr(module, "flow_field", lambda *_: sphere)
 
@@ -157,7 +160,7 @@ def test_grids_are_checked_before_anything_is_solved(run: Callable[..., Any], mo
     def solved(*_: object, **__: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(module, "predict", solved)
+    monkeypatch.setattr(module, "predict_steady", solved)
     assert run("flow", WIDE, "-o", "flow.png", "--resolution", "1").code == 2
     assert run("flow", WIDE, "--volume", "flow.vti", "--volume-resolution", "1").code == 2
     assert run("flow", WIDE, "-o", "flow.png", "--phase", "1").code == 2

@@ -42,7 +42,7 @@ def posterior() -> PosteriorFile:
 def test_limits_are_those_of_the_draws_followed_by_themselves() -> None:
     """Laid down and followed alone, each draw comes to the same steady motion: to 0.1 %."""
     known = posterior()
-    found = free_motion(WIDE, fit=fit_of_posterior(known), roughness=ROUGH)
+    found = free_motion(sp.load(WIDE), fit=fit_of_posterior(known), roughness=ROUGH)
     limits = intervals_of_free_motion(found, known, posterior_for="new")
     alone = [
         sp.predict(
@@ -63,7 +63,7 @@ def test_limits_are_those_of_the_draws_followed_by_themselves() -> None:
 
 def test_a_middle_without_a_steady_motion_has_no_intervals() -> None:
     known = posterior()
-    found = free_motion(WIDE, fit=fit_of_posterior(known), roughness=ROUGH)
+    found = free_motion(sp.load(WIDE), fit=fit_of_posterior(known), roughness=ROUGH)
     orbiting = found._replace(run=found.run._replace(lying=replace(found.run.lying, state="orbits")))
     with pytest.raises(sp.InputError, match="its median reaches no steady motion"):
         intervals_of_free_motion(orbiting, known, posterior_for="new")

@@ -202,7 +202,7 @@ def test_what_no_trial_can_have_is_refused() -> None:
 
 
 def test_a_trial_that_no_robot_or_model_has_is_refused_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spirillum.swimming.prediction.predict", None)
+    monkeypatch.setattr("spirillum.dynamics.prediction.predict_steady", None)
     for robot, settings in (
         ("ecoli", {}),
         ("biorob2012-wide", {"model": "sbt"}),

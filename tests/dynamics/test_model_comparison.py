@@ -51,7 +51,7 @@ def test_no_answer_at_all_is_an_error_with_every_reason(monkeypatch: pytest.Monk
     def refuse(_robot: Any, *, model: str, **_: Any) -> None:
         raise sp.InputError(f"{model} cannot")
 
-    monkeypatch.setattr(module, "predict", refuse)
+    monkeypatch.setattr(module, "predict_steady", refuse)
     with pytest.raises(sp.InputError, match="no model answers: sbt cannot; rft cannot") as caught:
         sp.compare_models(robot, models=["sbt", "rft"])
     assert caught.value.problems == ("sbt cannot", "rft cannot")

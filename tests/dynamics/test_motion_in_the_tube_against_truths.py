@@ -25,7 +25,7 @@ from spirillum.kernels import core
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
 from spirillum.swimming.motions import LINKS
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.steady import calibrated_resistance
 
 LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body
@@ -53,7 +53,7 @@ def made(stand_in: Any) -> Callable[..., Made]:
         **more: float,
     ) -> Made:
         robot = sp.load("biorob2012-wide", **(overrides or {}))
-        steady = predict(robot, model=model, friction=friction)
+        steady = predict_steady(robot, model=model, friction=friction)
         matrix = np.zeros((8, 8))
         twelve = calibrated_resistance(steady.batch, steady.model, calibrated=False)[0]
         matrix[:7, :7] = rest * LINKS.T @ twelve @ LINKS / robot.fluid.viscosity

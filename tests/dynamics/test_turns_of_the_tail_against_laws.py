@@ -14,7 +14,7 @@ from spirillum.dynamics.return_map import ReturnMap, fixed_place
 from spirillum.dynamics.tube_robot import Surroundings, tube_robot
 from spirillum.robot.placement import Placement
 from spirillum.swimming.motions import LINKS
-from spirillum.swimming.prediction import predict
+from spirillum.swimming.prediction import predict_steady
 from spirillum.swimming.steady import calibrated_resistance
 
 LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body
@@ -24,7 +24,7 @@ def of_long_capsule(stand_in: Any, rate: float, hand: str = "right", *, weight: 
     """The paper's robot on the stand-in for a table, turned from outside or with its tail at a rate."""
     drive = {"kind": "rate", "joint": "fixed" if rest < 1e-6 else "revolute", "rate": f"{rate} rad/s"}
     one = sp.load("biorob2012-wide", drive=drive, **{"tail.handedness": hand})
-    steady = predict(one, model="slender")
+    steady = predict_steady(one, model="slender")
     matrix = np.zeros((8, 8))
     twelve = calibrated_resistance(steady.batch, steady.model, calibrated=False)[0]
     matrix[:7, :7] = rest * LINKS.T @ twelve @ LINKS / one.fluid.viscosity

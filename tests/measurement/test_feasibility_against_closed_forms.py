@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spirillum import InputError
+from spirillum import InputError, load
 from spirillum.measurement.feasibility import feasibility
 from spirillum.measurement.setup_template import apparent_distance, depth_shares, new_setup_file, setup_answer
-from spirillum.swimming.prediction import predict
+from spirillum.swimming.prediction import predict_steady
 from spirillum.vision.setup import load_setup
 
 NEARER = (0.15 + (0.06 - 0.0115) / 1.4) / (0.15 + 0.06 / 1.4)
@@ -102,7 +102,7 @@ def test_a_robot_that_is_never_in_view_has_no_interval_and_no_verdict(setup_file
 def test_unknown_numbers_are_predicted_as_predict_does_or_left_out(setup_file: Path) -> None:
     found, said = (
         feasibility(setup_file, tail_rate="1.2 Hz"),
-        predict("biorob2012-wide", tail_rate="1.2 Hz", band=False),
+        predict_steady(load("biorob2012-wide"), tail_rate="1.2 Hz", band=False),
     )
     for name in ("forward_velocity", "body_rotation_rate"):
         assert found.expected[name] == (

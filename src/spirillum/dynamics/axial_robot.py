@@ -37,6 +37,7 @@ from spirillum.kernels.core import MOTOR_SIZE, steady_currents, windings
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import (
@@ -46,7 +47,7 @@ from spirillum.swimming.balance import (
     rates_per_torque,
     winding_resistance,
 )
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.reynolds import (
     body_reynolds,
     check_stokes_flow,
@@ -199,7 +200,7 @@ def axial_robot(
     """A robot in axial motion, as in a held run of `simulate`; arguments as of `predict`, a `flow` is an input."""
     placed = Placement.of(placement)
     pose = placed if placed.is_set else None
-    return AxialRobot.of(predict(robot, fit=read_fit(calibration), placement=pose, band=False, **asked))
+    return AxialRobot.of(predict_steady(load(robot), fit=read_fit(calibration), placement=pose, band=False, **asked))
 
 
 def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:

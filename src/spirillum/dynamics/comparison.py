@@ -30,7 +30,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.motions import STEADY, headline
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import UNBOUNDED, WALLED
 from spirillum.swimming.steady import find_friction_model, swim
 
@@ -101,7 +101,7 @@ def _released(held: Prediction, trial: Mapping[str, float], friction: str) -> It
     for name, left_out in (("film at the pose of the trial", {"yaw": 0.0}), ("yaw", {})):
         placement = Placement.of({**pose, **left_out, "ends": held.batch.placement.ends})
         try:
-            there = predict(
+            there = predict_steady(
                 held.robot, model=WALLED, friction=friction, calibrated=held.calibrated, placement=placement, band=False
             )
         except InputError:  # nearer to the wall than the table answers for: part of the next step
@@ -297,7 +297,7 @@ def compare_models(
         tell(progress, f"model {name}", done, len(names))
         placed = pose if find_swimmer_model(name).placed and pose != Placement() else None
         try:
-            held = predict(
+            held = predict_steady(
                 own,
                 model=name,
                 tail_rate=tail_rate,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,21 +19,19 @@ from spirillum.dynamics.release import InTube, Release, released_state
 from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_simulation import Checked, check_in_tube, compare_with_check, links_in_tube, sticking_notes
+from spirillum.dynamics.tube_simulation import Checked, compare_with_check, links_in_tube, sticking_notes, table_of_run
 from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.progress import Progress
 from spirillum.robot.fields import field_values
-from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.balance import current_at
 from spirillum.swimming.motions import State, SteadyState, Swimming
-from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import prepared, table_for
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
 from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.swimming.steady import swimming_of
@@ -221,7 +218,7 @@ class FreeMotion(NamedTuple):
 
 
 def free_motion(
-    robot: str | Path | Mapping[str, Any] | Robot,
+    robot: Robot,
     *,
     tail_rate: str | float | None = None,
     friction: str | None = None,
@@ -239,21 +236,17 @@ def free_motion(
     for item in field_values(requested.in_tube):
         if item.path in ("wait", "flow") and item.value is not None:
             raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
-    own = load(robot)
-    if fit.posterior is not None:
-        own = fit.central(own)
-        requested = requested._replace(placement=fit.placed(own, requested.placement))
-    ready, _, batch = prepared(own, "tube", fit=fit, placement=requested.placement)
-    if batch.drive == "magnetic":
+    ready = fit.central(robot)
+    requested = requested._replace(placement=fit.placed(ready, requested.placement))
+    if ready.drive is not None and ready.drive.kind == "magnetic":
         raise InputError(
             "drive.kind = 'magnetic': the motion depends on the phase of the field; allowed: drive.kind = "
             "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
         )
     release = requested.with_contact(fit.contact())
-    check_in_tube(ready, release)
     if ready.channel is not None:
         _check_until(until, gap_of(release.placement, ready.body.diameter, 0.5 * ready.channel.diameter))
-    table = table_for(batch, progress=progress)
+    table = table_of_run(ready, release, progress)
     held, links = prepare_release(ready, table.packed, release, tail_rate, friction)
     state = released_state(ready, links, release.placement, release.in_tube.azimuth)
     gap = float(observed_at(links, state)[core.SEEN_FILM])
@@ -264,8 +257,8 @@ def free_motion(
     sign = float(np.sign(held.tail_rotation_rate))
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell, turns_shown=turns_shown)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
-    limits = reynolds_limits(batch, swimming.reynolds_number, swimming.tail_reynolds_number)
-    inertia = check_stokes_flow(batch, limits)
+    limits = reynolds_limits(held.batch, swimming.reynolds_number, swimming.tail_reynolds_number)
+    inertia = check_stokes_flow(held.batch, limits)
     names = ("gap", "offset", "pitch", "yaw")
     checked = compare_with_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
     lies, slow = run.lying.state in ("steady", "orbits"), run.lying.approach_time
@@ -298,7 +291,8 @@ def prepare_release(
     robot: Robot, table: Samples, release: Release, tail_rate: str | float | None, friction: str | None
 ) -> tuple[Prediction, TubeRobot]:
     """The robot held at its initial pose, and the coefficients of its rates with its drive on, by its packed table."""
-    held = predict(robot, model="tube", tail_rate=tail_rate, friction=friction, placement=release.placement, band=False)
+    placed = release.placement
+    held = predict_steady(robot, model="tube", tail_rate=tail_rate, friction=friction, placement=placed, band=False)
     links = links_in_tube(held, table, release)
     if held.tail_rate is None:
         drive = held.robot.drive

@@ -38,7 +38,7 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import check_full
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import AUTO, choose_model, table_for
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, as_given, parse_option
@@ -131,7 +131,7 @@ class Plant:
             raise InputError(f"in_tube is given with model '{chosen.model}'; allowed: only with model 'tube'")
         if walled:
             check_in_tube(own, release)
-        self.steady: Prediction = predict(
+        self.steady: Prediction = predict_steady(
             own,
             model=chosen,
             friction=friction,

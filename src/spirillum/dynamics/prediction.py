@@ -17,8 +17,7 @@ from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming import prediction
-from spirillum.swimming.prediction import Prediction, interval_statement, with_posterior_medians
+from spirillum.swimming.prediction import Prediction, interval_statement, predict_steady, with_posterior_medians
 from spirillum.swimming.preparation import AUTO, WALLED, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import posterior_for_of
@@ -112,14 +111,14 @@ def predict(  # noqa: PLR0913 - the options of the command
         )
         request.check(choice.model, tail_rate, wanted=motion is None)
         of_trials = fit.posterior is not None and fit.of_trials
-        held = prediction.predict(
+        held = predict_steady(
             fit.central(own) if of_trials else own,
             model=choice,
             tail_rate=tail_rate,
             friction=friction,
             calibrated=calibrated,
             fit=replace(fit, posterior=None) if of_trials else fit,
-            posterior_for="new" if of_trials else posterior_for,
+            posterior_for="new" if of_trials else whose,
             resolution=resolution,
             placement=placement,
             band=band,

@@ -35,7 +35,7 @@ from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import Swimming, check_full
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import AUTO, NO_CHANNEL, UNBOUNDED, ModelChoice
 from spirillum.swimming.reynolds import (
     body_reynolds,
@@ -200,7 +200,7 @@ def magnetic_sweep(
     given = None if rates is None else _parse_rates(rates)
     own = with_resolution(loaded, resolution, choice.model)
     # The rates of the sweep decide whether there is an answer, not the robot's own.
-    held = replace(predict(without_reynolds_bound(own), model=choice, calibrated=False), robot=own)
+    held = replace(predict_steady(without_reynolds_bound(own), model=choice, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
     requested = _usual_rates(held) if given is None else given

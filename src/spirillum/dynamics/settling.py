@@ -33,10 +33,11 @@ from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.progress import Progress
 from spirillum.quantities import in_units
+from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import SteadyState
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import IN_CHANNEL
 from spirillum.units import KINDS, parse_option
 
@@ -232,7 +233,7 @@ def settle(
     """
     gap = None if until is None else parse_option("until", until, KINDS["length"])
     free = free_motion(
-        robot,
+        load(robot),
         tail_rate=tail_rate,
         friction=friction,
         fit=read_fit(calibration),
@@ -259,7 +260,7 @@ def _films(free: FreeMotion, first: float, last: float) -> tuple[LubricationFilm
     for gap in np.geomspace(first, last, _FILMS):
         placed = Placement.of({"gap": float(gap), "pitch": 0.0, "ends": motion.batch.placement.ends})
         try:
-            held = predict(
+            held = predict_steady(
                 motion.robot, model="tube", tail_rate=motion.tail_rotation_rate, placement=placed, band=False
             )
         except InputError:  # thinner than the model resolves

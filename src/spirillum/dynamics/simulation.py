@@ -18,27 +18,23 @@ from spirillum.dynamics.release import InTube, Release, check_not_resolved, reac
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
 from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
+from spirillum.dynamics.tube_simulation import run_in_tube, table_of_run
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, NO_FIT, Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.library import TabledTube
-from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.progress import Progress
-from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import check_full, motion_of
-from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import AUTO, table_for
+from spirillum.swimming.prediction import Prediction, predict_steady
+from spirillum.swimming.preparation import AUTO
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.scenario import NO_WEIGHT
-from spirillum.swimming.steady import find_friction_model, requirements
+from spirillum.swimming.steady import find_friction_model
 from spirillum.units import as_given
 
 if TYPE_CHECKING:
@@ -139,8 +135,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
         drawn = known if model == "tube" else None
         there = release.with_contact(contact if drawn is None else drawn.contact(draw))
         there = there if drawn is None else there._replace(placement=drawn.placed(one, placed, draw))
-        table = _table(one, there, tell) if walled else None
-        steady = predict(
+        table = table_of_run(one, there, tell) if walled else None
+        steady = predict_steady(
             one,
             model=model,
             friction=friction,
@@ -187,16 +183,6 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
     axis = TurningField(rotation_rate=0.0, strength=0.0, yaw=yaw, pitch=pitch).axis
     speed = 1e3 * float(way @ axis) / float(late["time"][-1] - late["time"][0])
     return [Note.named("along-tilted-axis", yaw=np.degrees(yaw), pitch=np.degrees(pitch), speed=speed)]
-
-
-def _table(robot: Robot, release: Release, progress: Progress | None) -> TubeTable:
-    """The robot's table, made if there is none, once all else is known to be right."""
-    batch = RobotBatch.of(robot, release.placement)
-    outside = broken(requirements(batch, TabledTube({})))
-    if outside:
-        raise InputError(f"{robot.name} with model 'tube': {outside[0].sentence()}")
-    check_in_tube(robot, release)
-    return table_for(batch, progress=progress)
 
 
 def _free_run(

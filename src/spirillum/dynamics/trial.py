@@ -42,7 +42,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.motions import ASSUMPTION, HELD, SPEED_OF, STEADY, ReleasedMotion, TrialInterval
-from spirillum.swimming.prediction import Prediction, interval_statement, predict
+from spirillum.swimming.prediction import Prediction, interval_statement, predict_steady
 from spirillum.swimming.preparation import WALLED, has_table, preparation_time, table_for, why_no_table
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import PosteriorFor
@@ -288,7 +288,7 @@ def quick_run(
     """Return the run of one of many trials, with a waiting time, in larger steps than `simulate`."""
     from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
 
-    steady = predict(robot, model=WALLED, placement=release.placement, band=False, **settings)
+    steady = predict_steady(robot, model=WALLED, placement=release.placement, band=False, **settings)
     times = Timing.of({"duration": duration, "samples_per_turn": _SAMPLES_PER_TURN})
     return run_in_tube(steady, table, times, release, Field(), progress=None, tolerance=_TOLERANCE)
 

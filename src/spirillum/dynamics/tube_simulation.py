@@ -18,6 +18,7 @@ from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.errors import InputError
+from spirillum.fluid.tube.library import TabledTube
 from spirillum.fluid.tube.table import BELOW, TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import core
@@ -25,12 +26,13 @@ from spirillum.kernels.core import MOTIONS, largest_yaw, resistance_at
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.progress import Progress
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.prediction import Prediction, free_in_tube
-from spirillum.swimming.preparation import check_usual_resolution
+from spirillum.swimming.preparation import check_domain, check_usual_resolution, table_for
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
 from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.units import show, show_height
@@ -191,6 +193,14 @@ def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
     if len(flow) > 1 and last < end * (1.0 - 1e-9):
         return [Note.named("flow-ends-early", source=source, last=last, end=end)]
     return []
+
+
+def table_of_run(robot: Robot, release: Release, progress: Progress | None) -> TubeTable:
+    """The table of a robot that is released in its tube, made if there is none, once all else is known to be right."""
+    batch = RobotBatch.of(robot, release.placement)
+    check_domain(robot, TabledTube({}), batch)
+    check_in_tube(robot, release)
+    return table_for(batch, progress=progress)
 
 
 def check_in_tube(robot: Robot, release: Release) -> None:

@@ -27,7 +27,7 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import TubePose
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared
 from spirillum.units import KINDS, parse_option
 from spirillum.version import versions
@@ -239,7 +239,7 @@ def flow(
         wanted = wanted.model_copy(update={"accuracy": "high"})
         difference = "solved at accuracy 'high', where `predict` takes 'standard'"
         choice = replace(choice, reason=f"{choice.reason}, {difference}" if choice.reason else difference)
-    prediction = predict(
+    prediction = predict_steady(
         robot,
         model=choice.model,
         tail_rate=tail_rate,
@@ -292,7 +292,7 @@ def find_tube_pose(
     chosen = _choice(model, robot, placement).model
     if chosen != "tube":
         return None
-    return pose_of(prepared(robot, chosen, placement=placement, resolution=resolution)[2])
+    return pose_of(prepared(robot, chosen, placement=Placement.of(placement), resolution=resolution)[2])
 
 
 def _attributes(flow: Flow) -> dict[str, Any]:

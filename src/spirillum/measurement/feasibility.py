@@ -218,13 +218,13 @@ def _expected(
     found = {name: (value, "given") for name, value in given.items() if value is not None}
     if len(found) == len(given):
         return {name: found[name] for name in given}, ()
-    from spirillum.swimming.prediction import predict
+    from spirillum.swimming.prediction import predict_steady
     from spirillum.swimming.preparation import AUTO, choose_model
     from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:
         choice = choose_model(AUTO, robot)
-        answer = predict(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
+        answer = predict_steady(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
     except InputError as error:
         raise InputError(f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all") from error
     held = ", held at its place" if answer.model.placed else ""

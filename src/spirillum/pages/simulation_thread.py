@@ -331,10 +331,10 @@ class SimulationThread:
                     model = built.model
                     self._built.put((index, generation, revision, built, None, ""))
                     self._wake_up()
-                from spirillum.swimming.prediction import predict
+                from spirillum.swimming.prediction import predict_steady
 
                 placement = settings.placement() if model == "tube" else None
-                numbers = prediction_answer(predict(predicted, model=model, placement=placement))
+                numbers = prediction_answer(predict_steady(predicted, model=model, placement=placement))
                 self._built.put((index, generation, revision, None, numbers, ""))
                 if numbers["columns"]:
                     with self._work:

@@ -28,7 +28,7 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import STEADY
-from spirillum.swimming.prediction import predict
+from spirillum.swimming.prediction import predict_steady
 from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import swim
 
@@ -246,7 +246,7 @@ def _swimming(robot: Robot, model: str, point: CasePoint, is_nominal: bool) -> d
     """All quantities of steady swimming, SI; the program states an error of the speed alone."""
     error = math.nan
     if is_nominal or model == "tube":  # which takes the robot's table where there is one
-        found = predict(robot, model=model, placement=point.placement, band=False)
+        found = predict_steady(robot, model=model, placement=point.placement, band=False)
         swum, error = found.swimming, found.error_estimate
     else:
         swum = swim(RobotBatch.of(robot, Placement.of(point.placement)), model)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,12 @@ from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import fit_clause
-from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.fluid.tube.progress_messages import LEVEL, TILTED, solution_message
 from spirillum.kernels.native import run_together
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -40,7 +38,7 @@ from spirillum.swimming.motions import (
     motion_of,
 )
 from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared, why_no_table
-from spirillum.swimming.sampled_resistance import PosteriorFor, posterior_for_of
+from spirillum.swimming.sampled_resistance import PosteriorFor
 from spirillum.swimming.scenario import OtherModels, Scenario, no_band_warnings, other_models
 from spirillum.swimming.steady import find_friction_model
 from spirillum.units import KINDS, parse_option
@@ -186,15 +184,15 @@ _MORE = {
 }
 
 
-def predict(
-    robot: str | Path | Mapping[str, Any] | Robot,
+def predict_steady(
+    robot: Robot,
     *,
     model: str | ModelChoice = AUTO,
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = True,
     fit: Fit = NO_FIT,
-    posterior_for: str = "new",
+    posterior_for: PosteriorFor = "new",
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     band: bool | None = None,
@@ -202,13 +200,9 @@ def predict(
     progress: Progress | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot with fitted values `fit`; else arguments as of `spirillum.predict`."""
-    own, given, drawn = load(robot), Placement.of(placement), fit.posterior
-    central = own if drawn is None else fit.central(own)
-    where = fit.placed(central, given)
-    choice = model if isinstance(model, ModelChoice) else choose_model(model, central, placement=where, fit=fit)
-    ready, chosen, batch = prepared(
-        central, choice.model, fit=fit, resolution=resolution, placement=where if where.is_set else None
-    )
+    given, drawn = Placement.of(placement), fit.posterior
+    choice, where = _chosen(model, robot, fit, given)
+    ready, chosen, batch = prepared(fit.central(robot), choice.model, resolution=resolution, placement=where)
     reading = find_friction_model(ready.friction.reading if friction is None else friction)
     rate = _rate(tail_rate, batch.placement)
     if rate is None and ready.drive is None:
@@ -222,9 +216,8 @@ def predict(
         calibrated=calibrated,
         motion=motion,
         fit=fit,
-        names_friction=own.friction.effective is not None,
+        names_friction=robot.friction.effective is not None,
     )
-    whose = posterior_for_of(posterior_for, drawn, ready)
     if band:
         _check_band(choice.model)
     intervals, torque = None, []
@@ -237,7 +230,7 @@ def predict(
             drawn,
             tail_rate=rate,
             friction=reading,
-            posterior_for=whose,
+            posterior_for=posterior_for,
             placement=given,
         )
         if not knows_torque(ready, chosen):
@@ -257,7 +250,7 @@ def predict(
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
     over = band_of(batch, chosen, result, scenario.swim, progress) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
-    if intervals is not None and whose == "measured":
+    if intervals is not None and posterior_for == "measured":
         result = with_posterior_medians(result, intervals)
     acts = friction_acts(reading, rate)
     idle = fit.outside_warnings(ready, chosen, friction=acts)
@@ -276,11 +269,21 @@ def predict(
         intervals=intervals,
         band=over,
         motion=motion_of(motion),
-        interval_of="" if idle else interval_statement(drawn, ready, whose),
+        interval_of="" if idle else interval_statement(drawn, ready, posterior_for),
         choice=choice,
         tail_rate=rate,
         fitted_by="" if idle else fit.source_of(ready, chosen, friction=acts),
     )
+
+
+def _chosen(model: str | ModelChoice, robot: Robot, fit: Fit, given: Placement) -> tuple[ModelChoice, Placement]:
+    """The model, and the placement with what a fit has found where the given one leaves it open."""
+    central = fit.central(robot)
+    where = fit.placed(central, given)
+    choice = model if isinstance(model, ModelChoice) else choose_model(model, central, placement=where, fit=fit)
+    if not where.is_set and find_swimmer_model(choice.model).placed:
+        where = fit.calibrated_placement(central) or where
+    return choice, where
 
 
 def free_in_tube(fitted_by: str) -> str:

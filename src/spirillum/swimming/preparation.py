@@ -105,21 +105,11 @@ _GAP_STEP = 1.02  # Ratio of gaps to which the least one that a model resolves i
 
 
 def prepared(
-    robot: str | Path | Mapping[str, Any] | Robot,
-    model: str,
-    *,
-    fit: Fit = NO_FIT,
-    resolution: Resolution | Mapping[str, Any] | None = None,
-    placement: Placement | Mapping[str, Any] | None = None,
+    robot: Robot, model: str, *, resolution: Resolution | Mapping[str, Any] | None = None, placement: Placement
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
-    """A loaded robot with its model and batch, at its pose and inside the model's domain."""
-    ready, chosen = load(robot), find_swimmer_model(model)
-    if fit.posterior is None:  # the median of a posterior stands in the robot already
-        ready = fit.central(ready)
-    if not placement and chosen.placed:
-        placement = fit.calibrated_placement(ready)
-    ready = with_resolution(ready, resolution, model)
-    batch = RobotBatch.of(ready, Placement.of(placement))
+    """A robot with its model and batch, at its pose and inside the model's domain."""
+    ready, chosen = with_resolution(robot, resolution, model), find_swimmer_model(model)
+    batch = RobotBatch.of(ready, placement)
     if np.all(all_hold(assembly_limits(batch))):  # a table reaches closer to the wall than a direct solution
         chosen = quickest(chosen, batch)
     check_domain(ready, chosen, batch)
@@ -309,7 +299,7 @@ def checked_geometries(robots: Sequence[Robot]) -> list[tuple[RobotGeometry, flo
 def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
     """What decides the table of a robot that has one; named in the sentence of an error where there are several."""
     # A table is valid for all poses: a robot is checked on the axis, where a tail wider than its body is off the glass.
-    _, _, batch = prepared(robot, "tube", placement={"eccentricity": 0.0})
+    _, _, batch = prepared(robot, "tube", placement=Placement(eccentricity=0.0))
     try:
         asked = _table_request(batch)
         _ = Places(*asked).gaps

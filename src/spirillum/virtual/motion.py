@@ -60,10 +60,10 @@ def steady_rates(
                 "which determine the motion; allowed: at most two of them"
             )
         return fixed, "prescribed", (), ""
-    from spirillum.swimming.prediction import predict
+    from spirillum.swimming.prediction import predict_steady
 
     choice = choose_model(motion.model or default_model, robot, placement=placement)
-    steady = predict(
+    steady = predict_steady(
         robot,
         model=choice.model,
         tail_rate=motion.tail_rate,
