@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import spirillum as sp
 from spirillum.cli.app import app
-from spirillum.dynamics import free_motion, simulation
+from spirillum.dynamics import tube_simulation
 from spirillum.errors import InputError
 from spirillum.swimming import preparation
 
@@ -20,7 +20,7 @@ def no_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def made(*_: Any, **__: Any) -> Any:
         raise AssertionError("a table would be made")
 
-    monkeypatch.setattr(simulation, "table_for", made)
+    monkeypatch.setattr(tube_simulation, "table_for", made)
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
 
 
@@ -49,15 +49,14 @@ def test_wrong_input_costs_no_table(wrong: dict[str, Any], words: str) -> None:
         sp.simulate(sp.load("biorob2012-wide", **ODD), model="tube", **wrong)
 
 
-def test_gap_above_the_start_is_refused_before_a_table_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(free_motion, "table_for", simulation.table_for)
+def test_gap_above_the_start_is_refused_before_a_table_is_made() -> None:
     robot = sp.load("biorob2012-wide", **ODD)
     with pytest.raises(InputError, match="until = 5 mm; allowed: less than 1 mm, the gap at the start"):
         sp.settle(robot, until="5 mm", placement={"gap": "1 mm"})
 
 
 def test_table_that_could_not_be_kept_is_not_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(preparation, "prepared_tables", simulation.table_for)
+    monkeypatch.setattr(preparation, "prepared_tables", tube_simulation.table_for)
     (tmp_path / "file").touch()
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path / "file"))
     with pytest.raises(InputError, match=r"SPIRILLUM_CACHE = .*file' cannot be written to; allowed: a folder"):
@@ -81,11 +80,12 @@ def test_least_gap_that_is_resolved_directly_is_told() -> None:
         sp.predict(robot, model="tube", placement={"gap": "0.02 mm", "pitch": 0.0})
     told = float(str(refused.value).split("placement.gap = ")[-1].split(" mm")[0])
     assert 0.02 < told < 0.5
+    from spirillum.robot.placement import Placement
     from spirillum.swimming.preparation import prepared
 
-    prepared(robot, "tube", placement={"gap": 1.001e-3 * told, "pitch": 0.0})  # is not refused
+    prepared(robot, "tube", placement=Placement(gap=1.001e-3 * told, pitch=0.0))  # is not refused
     with pytest.raises(InputError, match="unknowns"):
-        prepared(robot, "tube", placement={"gap": 0.97e-3 * told, "pitch": 0.0})
+        prepared(robot, "tube", placement=Placement(gap=0.97e-3 * told, pitch=0.0))
 
 
 @pytest.mark.usefixtures("unplaced")
