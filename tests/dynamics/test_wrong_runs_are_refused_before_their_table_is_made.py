@@ -83,9 +83,9 @@ def test_least_gap_that_is_resolved_directly_is_told() -> None:
     from spirillum.robot.placement import Placement
     from spirillum.swimming.preparation import prepared
 
-    prepared(robot, "tube", placement=Placement(gap=1.001e-3 * told, pitch=0.0))  # is not refused
+    prepared(robot, "tube", placement=Placement.of({"gap": 1.001e-3 * told}))  # is not refused
     with pytest.raises(InputError, match="unknowns"):
-        prepared(robot, "tube", placement=Placement(gap=0.97e-3 * told, pitch=0.0))
+        prepared(robot, "tube", placement=Placement.of({"gap": 0.97e-3 * told}))
 
 
 @pytest.mark.usefixtures("unplaced")
