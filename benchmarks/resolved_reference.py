@@ -32,7 +32,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg.lapack import dgels
 
 from spirillum.fluid.closed.perrin import spheroid_drag
-from spirillum.robot.geometry import centreline
+from spirillum.robot.tail_form import centreline
 
 Array = NDArray[np.float64]
 Sweep = Callable[[Array, Array, Array], Array]

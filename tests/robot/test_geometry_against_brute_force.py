@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from spirillum.robot import geometry
+from spirillum.robot import geometry, tail_form
 from spirillum.robot.load import load
 
 ENDS = ["hemisphere", "flat", "fillet"]
@@ -73,7 +73,7 @@ def test_coil_spacing(wavelength: float, amplitude: float) -> None:
     t = np.linspace(np.pi, 2.1 * np.pi, 20_001)
     d2 = squared(t)
     inner = np.flatnonzero((d2[1:-1] < d2[:-2]) & (d2[1:-1] <= d2[2:])) + 1
-    found = float(geometry.coil_spacing(np.array([wavelength]), np.array([amplitude]))[0])
+    found = float(tail_form.coil_spacing(np.array([wavelength]), np.array([amplitude]))[0])
     if inner.size == 0:
         assert np.isinf(found)
     else:
@@ -85,7 +85,7 @@ def test_coil_spacing_of_flat_coils_is_the_pitch_across_the_wire() -> None:
     """A tight coil's neighbouring turns lie lambda cos(inclination) apart."""
     wavelength, amplitude = np.array([1e-3]), np.array([10e-3])
     inclination = np.arctan(wavelength / (2 * np.pi * amplitude))
-    spacing = geometry.coil_spacing(wavelength, amplitude)
+    spacing = tail_form.coil_spacing(wavelength, amplitude)
     np.testing.assert_allclose(spacing, wavelength * np.cos(inclination), rtol=1e-6)
 
 
@@ -102,7 +102,7 @@ def test_centreline(hand: float, taper: float) -> None:
         return np.stack([x, r * np.cos(angle), r * np.sin(angle)], axis=-1)
 
     xi = np.linspace(0, L, 37)
-    line = geometry.centreline(
+    line = tail_form.centreline(
         xi,
         root=np.array([root]),
         wavelength=np.array([wavelength]),
@@ -124,7 +124,7 @@ def test_right_handed_means_right_handed() -> None:
         xi = np.linspace(0.02, 0.03, 7)
         one = {name: np.array([v]) for name, v in {"root": 0.0, "wavelength": 0.025, "amplitude": 0.0025}.items()}
         rest = {"length": np.array([0.06]), "taper": np.array([np.inf]), "phase": np.zeros(1)}
-        p = geometry.centreline(xi, hand=np.array([hand]), **one, **rest).position
+        p = tail_form.centreline(xi, hand=np.array([hand]), **one, **rest).position
         d1, d2, d3 = p[4] - p[2], p[4] - 2 * p[3] + p[2], p[5] - 2 * p[4] + 2 * p[2] - p[1]
         assert np.sign(np.cross(d1, d2) @ d3) == sign
 
@@ -132,7 +132,7 @@ def test_right_handed_means_right_handed() -> None:
 @given(wavelength=st.floats(1e-6, 1), ratio=st.floats(1e-4, 10), turns=st.floats(0.1, 100))
 def test_arc_fraction(wavelength: float, ratio: float, turns: float) -> None:
     """A helix unrolled: the hypotenuse of axial length and circumferences."""
-    arc = turns * wavelength / geometry.arc_fraction(np.array([wavelength]), np.array([ratio * wavelength]))[0]
+    arc = turns * wavelength / tail_form.arc_fraction(np.array([wavelength]), np.array([ratio * wavelength]))[0]
     assert arc == pytest.approx(turns * np.hypot(wavelength, 2 * np.pi * ratio * wavelength), rel=1e-13)
 
 
@@ -143,7 +143,7 @@ def test_turns_that_touch_are_refused(wavelength: float, amplitude: float, share
     from spirillum.errors import InputError
 
     lam, b = wavelength * 1e-3, amplitude * 1e-3
-    spacing = float(geometry.coil_spacing(np.array([lam]), np.array([b]))[0])
+    spacing = float(tail_form.coil_spacing(np.array([lam]), np.array([b]))[0])
     k = 2 * np.pi / lam
     curvature = b * k**2 / (1 + (b * k) ** 2)
     largest = min(spacing, 2 / curvature)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Outline, body_outline, cylinder_outline, solid_outlines
+from spirillum.robot.tail_form import centreline
 from spirillum.robot.tube_pose import STEEPEST_PITCH, TubePose, contact_pitch, largest_gap
 
 R = 0.02

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.robot.tail_form import amplitude_envelope
 
 INKS = {
     "red": (0.50, 0.055, 0.06),

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.links import outlines_of
 from spirillum.robot.load import load
 from spirillum.robot.outline import Segment
 from spirillum.robot.robot import Robot
+from spirillum.robot.tail_form import amplitude_envelope
 
 PAINTS = {
     "red": (176, 38, 70),

@@ -11,7 +11,7 @@ from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import STEADY
-from spirillum.swimming.steady import requirements, swim
+from spirillum.swimming.steady import swim
 
 BLOCK = 1 << 15
 WAVELENGTHS = np.array([10e-3, 15e-3, 20e-3, 25e-3])
@@ -155,7 +155,7 @@ def test_broken_requirement_names_field_value_limit_and_reason(wide: Any) -> Non
     from spirillum.robot.limits import broken
 
     batch = wide.with_values({"tail.wire_diameter": [1e-3, 7e-3]})
-    (limit,) = [limit for limit in broken(requirements(batch, find_swimmer_model("rft"))) if "rft" in limit.flag]
+    (limit,) = [limit for limit in broken(find_swimmer_model("rft").requirements(batch)) if "rft" in limit.flag]
     assert int(np.argmin(limit.holds)) == 1
     sentence = limit.sentence(1)
     # exp(1.5) 7 mm = 31.37 mm

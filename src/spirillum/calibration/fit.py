@@ -56,7 +56,6 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import AUTO, IN_CHANNEL, WALLED, ModelChoice
-from spirillum.swimming.steady import requirements
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
@@ -81,7 +80,7 @@ def choose_fitted_model(
     if all(robot.channel is None for robot in experiment.robots):
         return ModelChoice(UNWALLED, "no robot has a channel")
     batch = RobotBatch.of(experiment.robots)
-    outside = broken(requirements(batch, TabledTube({})))
+    outside = broken(TabledTube({}).requirements(batch))
     if outside:
         raise InputError(f"{experiment.source}: {outside[0].sentence()}; or model '{UNWALLED}', without walls")
     return ModelChoice(WALLED, IN_CHANNEL)

@@ -17,8 +17,8 @@ from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.display import percent
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
 from spirillum.robust import mad_scale
-from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
 
 RATES_IN_RADIANS = Note.named("rates-in-radians")  #: Where most robots need more torque than their motors give.
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}

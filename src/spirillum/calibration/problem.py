@@ -39,7 +39,6 @@ from spirillum.robot.limits import all_hold
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.sampled_resistance import AxialTable, Draws, chebyshev_points
-from spirillum.swimming.steady import requirements
 
 
 class UnexplainedError(InputError):
@@ -258,7 +257,7 @@ def _with_assumed(free: Sequence[str], assumed: Mapping[str, float]) -> tuple[st
 
 
 def _check_domain(experiment: Experiment, model: SwimmerModel, batch: RobotBatch) -> None:
-    limits = requirements(batch, model)
+    limits = model.requirements(batch)
     outside = np.flatnonzero(~all_hold(limits))
     if not outside.size:
         return

@@ -48,7 +48,6 @@ from spirillum.swimming.intervals import sampled_kinematics
 from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import fitted_with, has_table
 from spirillum.swimming.scenario import calibration_warnings
-from spirillum.swimming.steady import requirements
 
 _WHAT = "a file of candidates (CSV with channel_diameter_mm, wavelength_mm, amplitude_mm)"
 _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
@@ -232,7 +231,7 @@ def _outside(known: PosteriorFile, robot: Robot, answer: str) -> str:
         model = tabled(batch) or model
         if not isinstance(model, TabledTube):
             return "it has no table of its tube that covers the robots' poses; `spirillum prepare` makes one"
-    outside = broken(requirements(batch, model))
+    outside = broken(model.requirements(batch))
     return outside[0].sentence() if outside else ""
 
 

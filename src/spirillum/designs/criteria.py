@@ -17,9 +17,9 @@ from spirillum.quantities import Quantity
 from spirillum.robot.arguments import Options
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import LengthOrZero, field_values
-from spirillum.robot.geometry import coil_curvature
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
+from spirillum.robot.tail_form import coil_curvature
 from spirillum.swimming.motions import STEADY
 from spirillum.units import Kind, as_given, display_unit, in_unit, parse_option, show
 

@@ -19,16 +19,15 @@ from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.progress import Progress
-from spirillum.robot.limits import all_hold, broken
+from spirillum.robot.limits import all_hold, broken, reynolds_limits, reynolds_warnings, stokes_flow_problem
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.balance import find_friction_model
 from spirillum.swimming.motions import LEVEL, STEADY, Swimming
 from spirillum.swimming.preparation import AUTO, WALLED
-from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
 from spirillum.swimming.scenario import calibration_warnings, drive_warnings
-from spirillum.swimming.steady import find_friction_model
 from spirillum.units import KINDS, parse_option, show
 
 _MORE_DRAWS = 4  # draws of what is stated over those of the search

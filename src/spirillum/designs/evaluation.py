@@ -22,7 +22,7 @@ from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import Swimming
 from spirillum.swimming.preparation import AUTO
-from spirillum.swimming.steady import requirements, swim
+from spirillum.swimming.steady import swim
 
 
 class SampledRobots(NamedTuple):
@@ -224,7 +224,7 @@ class Evaluation:
         """Limits of manufacture, tube and model for designs; None: of the robot as it is."""
         batch = RobotBatch.of(self.space.robot) if shares is None else self.space.batch(shares)
         with np.errstate(all="ignore"):  # what is out of all proportion is refused by a limit
-            return [*requirements(batch, self.model), *self.manufacturability.limits(batch)]
+            return [*self.model.requirements(batch), *self.manufacturability.limits(batch)]
 
     def excess(self, condition: Condition, motion: Swimming) -> Samples:
         """By how much designs break a condition in the draws that have to keep it, (designs,)."""

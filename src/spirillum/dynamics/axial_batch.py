@@ -18,11 +18,11 @@ from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.robot.batch import batches
 from spirillum.robot.fields import kind_of
+from spirillum.robot.limits import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, motor_current_problem
 from spirillum.scalars import is_whole
 from spirillum.swimming.preparation import AUTO
-from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.units import parse_option
 
 FACTORS = ("friction", "viscosity")  #: Ranges that are factors of the robot's own value, sampled log-uniformly.

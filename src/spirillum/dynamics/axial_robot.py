@@ -37,6 +37,14 @@ from spirillum.kernels.core import MOTOR_SIZE, steady_currents, windings
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.limits import (
+    body_reynolds,
+    check_stokes_flow,
+    flow_limit,
+    motion_limits,
+    reynolds_limits,
+    tail_reynolds,
+)
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -48,14 +56,6 @@ from spirillum.swimming.balance import (
     winding_resistance,
 )
 from spirillum.swimming.prediction import Prediction, predict_steady
-from spirillum.swimming.reynolds import (
-    body_reynolds,
-    check_stokes_flow,
-    flow_limit,
-    motion_limits,
-    reynolds_limits,
-    tail_reynolds,
-)
 from spirillum.swimming.steady import calibrated_balance
 from spirillum.units import show
 

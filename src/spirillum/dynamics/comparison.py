@@ -29,10 +29,11 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
+from spirillum.swimming.balance import find_friction_model
 from spirillum.swimming.motions import STEADY, headline
 from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import UNBOUNDED, WALLED
-from spirillum.swimming.steady import find_friction_model, swim
+from spirillum.swimming.steady import swim
 
 LIGHTHILL = "sbt"  #: The theory from which the effects are counted.
 

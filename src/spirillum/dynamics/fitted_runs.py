@@ -21,12 +21,11 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.progress import Progress, tell
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, without_reynolds_bound
 from spirillum.scalars import is_whole
 from spirillum.swimming.intervals import intervals_over, sampled_batch
 from spirillum.swimming.motions import LEVEL, Intervals, Swimming
 from spirillum.swimming.preparation import ModelChoice, choose_model
-from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import PosteriorFor, sampled_discrepancy
 from spirillum.swimming.steady import one_after_another
 

@@ -23,10 +23,10 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
+from spirillum.swimming.balance import find_friction_model
 from spirillum.swimming.motions import STEADY, Swimming
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import check_domain, least_gap
-from spirillum.swimming.steady import find_friction_model, requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     try:
         friction = find_friction_model(str(now.attrs.get("friction", robot.friction.reading)))
         batch = RobotBatch.of(robot, Placement.of(requested))
-        if broken(requirements(batch, Tube())):
+        if broken(Tube().requirements(batch)):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
         batch = RobotBatch.of(robot, Placement.of({**requested, "gap": drawn}))
         check_domain(robot, quickest(Tube(), batch), batch)

@@ -26,13 +26,13 @@ from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.progress import Progress
 from spirillum.robot.fields import field_values
+from spirillum.robot.limits import check_stokes_flow, in_stokes_flow, reynolds_limits
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.balance import current_at
 from spirillum.swimming.motions import State, SteadyState, Swimming
 from spirillum.swimming.prediction import Prediction, predict_steady
-from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
 from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.swimming.steady import swimming_of
 from spirillum.units import show

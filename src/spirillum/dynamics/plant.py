@@ -34,13 +34,13 @@ from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import check_stokes_flow, flow_limit, motion_limits
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.motions import check_full
 from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import AUTO, choose_model, table_for
-from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, as_given, parse_option
 
 _LONGEST = 1e6  # The longest step, s.

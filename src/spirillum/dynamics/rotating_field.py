@@ -31,20 +31,13 @@ from spirillum.quantities import attributes
 from spirillum.robot.arguments import Options
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
+from spirillum.robot.limits import body_reynolds, reynolds_limits, reynolds_warnings, stokes_flow_problem, tail_reynolds
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, without_reynolds_bound
 from spirillum.swimming.motions import Swimming, check_full
 from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import AUTO, NO_CHANNEL, UNBOUNDED, ModelChoice
-from spirillum.swimming.reynolds import (
-    body_reynolds,
-    reynolds_limits,
-    reynolds_warnings,
-    stokes_flow_problem,
-    tail_reynolds,
-    without_reynolds_bound,
-)
 from spirillum.swimming.steady import swim
 from spirillum.units import KINDS, parse_option, show
 from spirillum.version import versions

@@ -25,16 +25,16 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import core
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.progress import Progress
+from spirillum.robot.limits import check_stokes_flow, in_stokes_flow, motion_limits
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Robot, without_reynolds_bound
+from spirillum.swimming.balance import find_friction_model
 from spirillum.swimming.motions import check_full, motion_of
 from spirillum.swimming.prediction import Prediction, predict_steady
 from spirillum.swimming.preparation import AUTO
-from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.scenario import NO_WEIGHT
-from spirillum.swimming.steady import find_friction_model
 from spirillum.units import as_given
 
 if TYPE_CHECKING:

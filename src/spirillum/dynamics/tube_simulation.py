@@ -28,12 +28,12 @@ from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
+from spirillum.robot.limits import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.swimming.preparation import check_domain, check_usual_resolution, table_for
-from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
 from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.units import show, show_height
 

@@ -16,7 +16,7 @@ import numpy as np
 from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot
 from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit
+from spirillum.robot.limits import Limit, assembly_limits
 from spirillum.robot.model_options import ModelOptions
 
 PARTS = ("body", "coupling", "tail", "rotor", "robot")
@@ -50,6 +50,10 @@ class ResistanceModel(ABC):
     @abstractmethod
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Requirements of the theory: if violated, the result is NaN in a batch and an `InputError` for one robot."""
+
+    def requirements(self, batch: RobotBatch) -> list[Limit]:
+        """What every robot has to fulfil for this model to answer: it can be built, and is inside the domain."""
+        return assembly_limits(batch) + self.domain(batch)
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """Requirements on one part alone: those of the tail do not matter to body and coupling."""

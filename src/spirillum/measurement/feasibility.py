@@ -218,9 +218,9 @@ def _expected(
     found = {name: (value, "given") for name, value in given.items() if value is not None}
     if len(found) == len(given):
         return {name: found[name] for name in given}, ()
+    from spirillum.robot.limits import reynolds_limits, reynolds_warnings
     from spirillum.swimming.prediction import predict_steady
     from spirillum.swimming.preparation import AUTO, choose_model
-    from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:
         choice = choose_model(AUTO, robot)

@@ -12,14 +12,13 @@ import numpy as np
 from spirillum.argument_validation import number_array, validate_arguments, whole_array
 from spirillum.arrays import Flags, PerRobot, Values
 from spirillum.errors import InputError, clipped
-from spirillum.robot import geometry
-from spirillum.robot.geometry import End, Shape
+from spirillum.robot.geometry import End, ProfilePoints, Shape, body_volume
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.outline import profile_outline
 from spirillum.robot.placement import Placement
 from spirillum.robot.shape_input import source_of
 from spirillum.robot.tables import DriveKind, FrictionModel, RobotTables, TorqueCurve
-from spirillum.robot.tail_form import TailForm
+from spirillum.robot.tail_form import TailForm, arc_fraction
 
 
 class Column(NamedTuple):
@@ -153,7 +152,7 @@ class RobotBatch:
     shape: Shape
     front: End | None
     rear: End | None
-    profile: geometry.ProfilePoints
+    profile: ProfilePoints
     form: TailForm
     options: ModelOptions
     drive: DriveKind | None
@@ -269,7 +268,7 @@ class RobotBatch:
     def arc_fraction(self) -> PerRobot:
         """alpha, axial over arc length of the helix without its root, or of the centre line."""
         if self.form.is_helix:
-            return geometry.arc_fraction(self.wavelength, self.amplitude)
+            return arc_fraction(self.wavelength, self.amplitude)
         return self.tail_length / self.form.arc_length(self.amplitude, self.wavelength, self.tail_length)
 
     @cached_property
@@ -296,9 +295,7 @@ class RobotBatch:
         if self.profile:
             _, square, dx = profile_outline(self.profile).sections()
             return np.full(1, np.pi * np.sum(square * dx))
-        return geometry.body_volume(
-            self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear
-        )
+        return body_volume(self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear)
 
 
 """Fields that follow from a centre line through points."""

@@ -19,10 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Tensors, Vectors
-from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
-from spirillum.robot.tail_form import PLAIN, TailForm
+from spirillum.robot.tail_form import PLAIN, TailForm, centreline
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PANELS_PER_TURN = 4

@@ -16,11 +16,12 @@ from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.data_tables import rows_of
 from spirillum.errors import InputError, check_memory
-from spirillum.robot.geometry import Centreline, StripeColour, centreline
+from spirillum.robot.geometry import StripeColour
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, Surface, mass_properties, profile_of, revolved, rod, swept
+from spirillum.robot.tail_form import Centreline, centreline
 from spirillum.units import show
 
 Colour = tuple[float, float, float]

@@ -227,3 +227,8 @@ def _with_unit(value: float, unit: str) -> str:
         if parse_quantity(text, Kind("quantity", unit, f"1 {unit}", f"-1e30 {unit}", f"1e30 {unit}")) == value:
             return text
     return f"{value!r} {unit}"
+
+
+def without_reynolds_bound(robot: Robot) -> Robot:
+    """Return the robot with its option `model.beyond_stokes` on."""
+    return robot.model_copy(update={"model": robot.model.model_copy(update={"beyond_stokes": True})})

@@ -1,4 +1,4 @@
-"""Form of a tail beyond one plain helix: several starts, sizes that vary along it, a centre line through points."""
+"""Form of a tail: its helix, several starts, sizes that vary along it, or a centre line through points."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Samples, Tensors, Values
+from spirillum.arrays import Samples, Tensors, Values, Vectors
 
 Along = tuple[tuple[float, float], ...]
 """Factor along the tail: (share of its length, factor) from 0 to 1; empty where it is uniform."""
@@ -189,3 +189,99 @@ def strand_spacing(wavelength: Values, amplitude: Values, starts: int) -> Values
     t = 0.5 * (low + high)
     found: Values = np.sqrt(2.0 * b2 * (1.0 - np.cos(t)) + p2 * (t - whole) ** 2)
     return found
+
+
+def arc_fraction(wavelength: Values, amplitude: Values) -> Values:
+    """Alpha = [1 + (2 pi B_o/lambda)^2]^(-1/2): axial over arc length of a plain helix (Section II-B)."""
+    return 1.0 / np.sqrt(1.0 + (2.0 * np.pi * amplitude / wavelength) ** 2)
+
+
+def coil_curvature(wavelength: Values, amplitude: Values) -> Values:
+    """Curvature of a plain helix, B_o k^2 alpha^2 with k = 2 pi/lambda, 1/m."""
+    return amplitude * (2.0 * np.pi / wavelength) ** 2 * arc_fraction(wavelength, amplitude) ** 2
+
+
+def amplitude_envelope(xi: Values, amplitude: Values, length: Values, taper: Values) -> tuple[Values, Values]:
+    """Local amplitude of eq. (10), r = B_o (1 - exp(-c xi/L_t)), and its slope; c is infinite for a plain helix."""
+    with np.errstate(invalid="ignore"):
+        decay = np.where(np.isinf(taper), 0.0, np.exp(-taper * xi / length))
+        slope = np.where(np.isinf(taper), 0.0, amplitude * taper / length * decay)
+    return amplitude * (1.0 - decay), slope
+
+
+class Centreline(NamedTuple):
+    """The wire's centreline in the frame of the body (origin at its mid-length on the motor axis)."""
+
+    position: Vectors  #: Points, m.
+    tangent: Vectors  #: Unit tangents, pointing away from the root.
+    stretch: Values  #: Arc length per axial length, ds/dxi.
+
+
+def centreline(
+    xi: Values,
+    *,
+    root: Values,
+    wavelength: Values,
+    amplitude: Values,
+    length: Values,
+    taper: Values,
+    hand: Values,
+    phase: Values,
+    form: TailForm = PLAIN,
+) -> Centreline:
+    """The wire of eq. (10): x = -x_r - xi, y = r cos(h k x + phi), z = r sin(h k x + phi); arguments broadcast."""
+    # `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left). Where the wavelength varies, k x is an
+    # integral from the root; on a centre line through points xi/L_t is its parameter, from 0 to 1.
+    if form.curve:
+        return _through_points(xi / length, root, length, hand, phase, form)
+    wavenumber = 2.0 * np.pi / wavelength
+    x = -root - xi
+    r, slope = amplitude_envelope(xi, amplitude, length, taper)
+    angle = hand * wavenumber * x + phase
+    if form.amplitude:
+        factor, change = form.amplitude_at(xi / length)
+        r, slope = r * factor, slope * factor + r * change / length
+    if form.wavelength:
+        factor, turned = form.wavenumber_at(xi / length)
+        angle = -hand * wavenumber * (root + length * turned) + phase
+        wavenumber = wavenumber * factor
+    cos, sin = np.cos(angle), np.sin(angle)
+    turning = -hand * wavenumber * r  # r d(angle)/dxi
+    stretch = np.sqrt(1.0 + slope**2 + turning**2)
+    position = np.stack(np.broadcast_arrays(x, r * cos, r * sin), axis=-1)
+    direction = np.stack(
+        np.broadcast_arrays(-np.ones_like(x), slope * cos - turning * sin, slope * sin + turning * cos), axis=-1
+    )
+    return Centreline(position, direction / stretch[..., None], stretch)
+
+
+def _through_points(
+    share: Values, root: Values, length: Values, hand: Values, phase: Values, form: TailForm
+) -> Centreline:
+    """A centre line in the tail's frame, half a turn about y from the body's axes; mirrored for the other hand."""
+    point, rate = form.centre.at(share)
+    cos, sin, side = np.cos(phase), np.sin(phase), -hand * np.sign(form.centre.winding or 1.0)
+    y, z = point[..., 1], side * point[..., 2]
+    dy, dz = rate[..., 1], side * rate[..., 2]
+    speed = np.linalg.norm(rate, axis=-1)
+    position = np.stack(np.broadcast_arrays(-root - point[..., 0], y * cos - z * sin, y * sin + z * cos), axis=-1)
+    direction = np.stack(np.broadcast_arrays(-rate[..., 0], dy * cos - dz * sin, dy * sin + dz * cos), axis=-1)
+    return Centreline(position, direction / speed[..., None], speed / length)
+
+
+def coil_spacing(wavelength: Values, amplitude: Values) -> Values:
+    """Smallest distance between neighbouring turns of the centreline, m; infinite if turns never come close."""
+    # The distance between two points of a helix at an angle t apart is
+    # d(t)^2 = 2 b^2 (1 - cos t) + (lambda t/2 pi)^2; its minimum near t = 2 pi solves sin t + (p/b)^2 t = 0
+    # with p = lambda/2 pi (Przybyl and Pieranski, Eur. Phys. J. E 4:445, 2001).
+    ratio = (wavelength / (2.0 * np.pi * amplitude)) ** 2
+    neighbours = ratio * 4.4934 < 0.9761  # sin t = -ratio t has a root beyond the tangent point tan t = t
+    t = np.full(np.shape(ratio), 2.0 * np.pi)
+    r = np.where(neighbours, ratio, 0.0)
+    for _ in range(60):  # monotone from the right where convex; few steps are needed
+        step = (np.sin(t) + r * t) / np.maximum(np.cos(t) + r, 1e-3)
+        t = np.clip(t - step, 4.4934, 2.0 * np.pi)
+        if np.all(np.abs(step) < 1e-9):
+            break
+    distance = np.sqrt(2.0 * amplitude**2 * (1.0 - np.cos(t)) + (wavelength * t / (2.0 * np.pi)) ** 2)
+    return np.where(neighbours, distance, np.inf)

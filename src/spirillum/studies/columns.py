@@ -28,7 +28,7 @@ from spirillum.studies.work import MOVING, OneModel, OneRobot, Part, flag_attrib
 from spirillum.swimming.band import at_pose, band_poses
 from spirillum.swimming.motions import ASSUMPTION
 from spirillum.swimming.preparation import WALLED, has_table
-from spirillum.swimming.steady import one_after_another, requirements, swim
+from spirillum.swimming.steady import one_after_another, swim
 from spirillum.units import show
 
 AT_POSES = (
@@ -127,7 +127,7 @@ def missing_pose_notes(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
         missing = np.flatnonzero(np.isnan(part["forward_velocity"]).all(axis=-1))
         if missing.size:
             first = task.robots[int(missing[0])]
-            outside = broken(requirements(first, find_swimmer_model(task.model)))
+            outside = broken(find_swimmer_model(task.model).requirements(first))
             why = outside[0].sentence() if outside else "they find no steady motion there"
             found.append(Note.named("band-leaves-out", model=task.model, count=missing.size, where=task.where, why=why))
     return found

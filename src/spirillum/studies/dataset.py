@@ -16,7 +16,7 @@ from spirillum.files import loaded_netcdf
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
-from spirillum.robot.limits import broken, caution_code
+from spirillum.robot.limits import broken, caution_code, reynolds_limits, stokes_flow_problem
 from spirillum.studies.columns import BandTask, HeldTask, TrialTask, column_variables, with_band
 from spirillum.studies.released_robots import (
     AT_RUNS,
@@ -36,9 +36,7 @@ from spirillum.studies.spec import LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import REASONS, ModelTask, Part, flag_attributes, gathered
 from spirillum.swimming.motions import STEADY, Swimming
-from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
 from spirillum.swimming.scenario import accuracy_limits
-from spirillum.swimming.steady import requirements
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -317,7 +315,7 @@ def _refusals(task: ModelTask, part: Part) -> list[Caution]:
     """Why robots of a task have no answer, one for each requirement; each robot counts for the first that it breaks."""
     left = np.any(part["outside"] != 0, axis=-1)
     found = []
-    for limit in broken(requirements(task.batch, find_swimmer_model(task.model))):
+    for limit in broken(find_swimmer_model(task.model).requirements(task.batch)):
         of_this = left & ~np.broadcast_to(limit.holds, left.shape)
         if of_this.any():
             sentence = limit.sentence(int(np.argmax(of_this)))

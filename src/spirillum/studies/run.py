@@ -47,7 +47,6 @@ from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, 
 from spirillum.swimming.band import left_open
 from spirillum.swimming.preparation import has_table, missing_tables
 from spirillum.swimming.scenario import CONSTANT_TORQUE, calibration_warnings
-from spirillum.swimming.steady import requirements
 from spirillum.version import package_version
 from spirillum.worker_pool import ESTIMATE, WorkerPool, map_tasks
 
@@ -283,7 +282,7 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
             robot, why = loaded.robot_at(index), "without-yawed-table"
             if robot.channel is None:
                 why = "without-channel"
-            elif broken(requirements(RobotBatch.of(robot, loaded.placement_at(index)), TabledTube({}))):
+            elif broken(TabledTube({}).requirements(RobotBatch.of(robot, loaded.placement_at(index)))):
                 why = "without-room"
             found.setdefault(why, []).append(robot)
     return [

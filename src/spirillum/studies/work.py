@@ -25,7 +25,7 @@ from spirillum.robot.robot import Robot
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays, observed_at
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
 from spirillum.swimming.motions import STEADY, Swimming
-from spirillum.swimming.steady import one_after_another, requirements, speed_error, swim
+from spirillum.swimming.steady import one_after_another, speed_error, swim
 
 MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
 """Quantities of every motion."""
@@ -357,7 +357,7 @@ def _curve(quick: QuickParts, reading: str, driven: Values) -> Part:
 def _reasons(batch: RobotBatch, model: str) -> PerRobot:
     """For each robot the first requirement that it breaks, as its index in `REASONS`."""
     reason = np.zeros(batch.size)
-    for limit in requirements(batch, find_swimmer_model(model)):
+    for limit in find_swimmer_model(model).requirements(batch):
         code = REASONS.index(limit.flag) if limit.flag in REASONS else REASONS.index("other")
         reason = np.where((reason == 0) & ~np.broadcast_to(limit.holds, reason.shape), code, reason)
     return reason

@@ -19,7 +19,7 @@ drives. The pulse-width controller (400 kHz, far above R/L) is averaged: the mot
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -172,6 +172,13 @@ def _determinant(s: TorqueBalance, t: FrictionTorques) -> Values:
     fluid = s.bb * s.rr - s.br * s.rb
     mixed = s.bb * t.rr + t.bb * s.rr - s.br * t.rb - t.br * s.rb
     return fluid + mixed + t.determinant
+
+
+def find_friction_model(name: str) -> FrictionModel:
+    """Return the friction model of that name."""
+    if name not in get_args(FrictionModel):
+        raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionModel))}")
+    return cast("FrictionModel", name)
 
 
 def friction_torques(reading: FrictionModel, effective: Values, rotor_friction: Values) -> FrictionTorques:

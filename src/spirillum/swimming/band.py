@@ -33,7 +33,7 @@ from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
 from spirillum.swimming.motions import STEADY, Swimming
-from spirillum.swimming.steady import one_after_another, requirements
+from spirillum.swimming.steady import one_after_another
 from spirillum.units import show
 
 PLACES_PER_FIELD = 3  #: Gaps, and pitches at each of them.
@@ -167,7 +167,7 @@ def band_of(
         there = at_pose(batch, place)
         found.append(answer(there))
         if not found[-1].valid[0]:
-            outside = broken(requirements(there, model))
+            outside = broken(model.requirements(there))
             why = outside[0].sentence() if outside else "the robot finds no steady motion there"
             left_out.append(Note.named("pose-left-out", where=where, why=why))
     tell(progress, model.name, len(places) + 1, len(places) + 1)

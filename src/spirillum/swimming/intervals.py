@@ -22,10 +22,16 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
-from spirillum.swimming.balance import battery_voltage, current_at, friction_torques, run_time, steady_current
+from spirillum.robot.robot import Robot, without_reynolds_bound
+from spirillum.swimming.balance import (
+    battery_voltage,
+    current_at,
+    find_friction_model,
+    friction_torques,
+    run_time,
+    steady_current,
+)
 from spirillum.swimming.motions import LEVEL, STEADY, Intervals, Swimming
-from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.sampled_resistance import (
     AxialTable,
     PosteriorFor,
@@ -33,7 +39,7 @@ from spirillum.swimming.sampled_resistance import (
     chebyshev_points,
     sampled_discrepancy,
 )
-from spirillum.swimming.steady import KnownResistance, find_friction_model, swim_on_floor
+from spirillum.swimming.steady import KnownResistance, swim_on_floor
 
 OF_TORQUE = (
     "tail_torque",

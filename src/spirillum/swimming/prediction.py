@@ -26,6 +26,7 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
+from spirillum.swimming.balance import find_friction_model
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.motions import (
     STEADY,
@@ -40,7 +41,6 @@ from spirillum.swimming.motions import (
 from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared, why_no_table
 from spirillum.swimming.sampled_resistance import PosteriorFor
 from spirillum.swimming.scenario import OtherModels, Scenario, no_band_warnings, other_models
-from spirillum.swimming.steady import find_friction_model
 from spirillum.units import KINDS, parse_option
 
 

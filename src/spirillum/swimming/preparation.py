@@ -38,7 +38,6 @@ from spirillum.robot.model_options import ModelOptions, Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
-from spirillum.swimming.steady import requirements
 from spirillum.units import show, show_apart
 
 AUTO = "auto"  #: Name that leaves the choice of the model to `choose_model`.
@@ -73,11 +72,11 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
     if robot.channel is None:
         return ModelChoice(UNBOUNDED, NO_CHANNEL)
     batch = RobotBatch.of(robot, placement or Placement())
-    outside = broken(requirements(batch, find_swimmer_model(WALLED)))
+    outside = broken(find_swimmer_model(WALLED).requirements(batch))
     if outside and (placement is None or not placement.is_set):  # a pose is refused by the model that takes poses
         said = f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}"
         for name in (UNBOUNDED, *(name for name, model in SWIMMER_MODELS.items() if not model.placed)):
-            if not broken(requirements(batch, find_swimmer_model(name))):
+            if not broken(find_swimmer_model(name).requirements(batch)):
                 raise InputError(f"{said}; or model '{name}', which leaves out the walls")
         raise InputError(said)
     return ModelChoice(WALLED, IN_CHANNEL)
@@ -90,7 +89,7 @@ def models_without_answer(robot: Robot) -> list[str]:
     for name, model in SWIMMER_MODELS.items():
         if model.placed and robot.channel is None:
             continue
-        outside = broken(requirements(batch, model))
+        outside = broken(model.requirements(batch))
         if outside:
             found.append(f"model '{name}' has no answer for it: {outside[0].sentence()}")
     return found
@@ -119,7 +118,7 @@ def prepared(
 def check_domain(robot: Robot, model: SwimmerModel, batch: RobotBatch) -> None:
     """Refuse a robot at its pose, a batch of one, outside a model's domain."""
     check_placement(batch.placement, model)
-    outside = broken(requirements(batch, model))
+    outside = broken(model.requirements(batch))
     if outside:
         raise InputError(
             f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_remedy(batch, model, outside)}"
@@ -146,7 +145,7 @@ def least_gap(batch: RobotBatch, model: SwimmerModel) -> float:
 
     def fits(gap: float) -> bool:
         placed = batch.placement.model_copy(update={"gap": gap})
-        return not broken(requirements(replace(batch, placement=placed), model))
+        return not broken(model.requirements(replace(batch, placement=placed)))
 
     low, high = given, GAP_SHARE * 0.5 * float(batch.body_diameter[0])
     if low >= high or not fits(high):
@@ -330,7 +329,7 @@ def table_for(batch: RobotBatch, *, progress: Progress | None = None) -> TubeTab
 
 def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeometry, float]]:
     """Return what decides the tables that robots of a batch lack in their tubes, each once."""
-    fits = all_hold(requirements(batch, TabledTube({})))
+    fits = all_hold(TabledTube({}).requirements(batch))
     every = [in_tube(batch, index) for index in np.flatnonzero(fits).tolist()]
     return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and not _why_no_table(*one)]
 

@@ -15,15 +15,14 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, broken
+from spirillum.robot.limits import Limit, broken, in_stokes_flow, reynolds_limits, stokes_flow_problem
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.band import left_open
 from spirillum.swimming.motions import Motion, Swimming
 from spirillum.swimming.preparation import has_table, preparation_time, why_no_table
-from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.steady import calibrated_balance, requirements, speed_error, swim, swim_on_floor
+from spirillum.swimming.steady import calibrated_balance, speed_error, swim, swim_on_floor
 from spirillum.units import show
 
 NO_WEIGHT = Note.named("no-masses")  #: Caution of a free motion of a robot whose masses are unknown.
@@ -282,7 +281,7 @@ def other_models(
     rates = None if tail_rate is None else np.array([tail_rate])
     found = []
     for other in simpler:
-        if (motion == "free" and other.axial_only) or broken(requirements(batch, other)):
+        if (motion == "free" and other.axial_only) or broken(other.requirements(batch)):
             continue
         of_this = other.name in robot.calibration and not calibration_warnings(robot, other.name)
         for calibrated in (False, True) if of_this else (False,):

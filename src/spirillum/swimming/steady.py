@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, cast, get_args
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels.core import contact_drag
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.limits import Limit, all_hold, body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.robot.tables import FrictionModel
@@ -38,6 +38,7 @@ from spirillum.swimming.balance import (
     at_rate,
     battery_voltage,
     driven,
+    find_friction_model,
     force_free,
     joined,
     one_piece,
@@ -46,14 +47,8 @@ from spirillum.swimming.balance import (
     with_body_factors,
 )
 from spirillum.swimming.motions import STEADY, Motion, Screw, Swimming, check_full, motion_of
-from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
 
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
-
-
-def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:
-    """What every robot has to fulfil for this model to answer."""
-    return assembly_limits(batch) + model.domain(batch)
 
 
 def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> TorqueBalance:
@@ -171,13 +166,6 @@ def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
     return total
 
 
-def find_friction_model(name: str) -> FrictionModel:
-    """Return the friction model of that name."""
-    if name not in get_args(FrictionModel):
-        raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionModel))}")
-    return cast("FrictionModel", name)
-
-
 def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
     """One rate for each robot; NaN where there is none."""
     array = np.atleast_1d(number_array(name, np.nan if rate is None else rate, "numbers in rad/s"))
@@ -196,7 +184,7 @@ def _swim_block(
     driven_freely: bool,  # noqa: FBT001 - passed on by the one caller
     calibrated: bool,  # noqa: FBT001
 ) -> Swimming:
-    valid = batch.known & all_hold(requirements(batch, model))
+    valid = batch.known & all_hold(model.requirements(batch))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         shared = flow = None
         if motion == "held":

@@ -19,9 +19,9 @@ from spirillum.fluid.closed.sbt import thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import CHECKED, SPEED_ERRORS, STATED, speed_note, validation_note, wall_clause
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import centreline
 from spirillum.robot.limits import Limit
 from spirillum.robot.model_options import ModelOptions
+from spirillum.robot.tail_form import centreline
 
 
 class LocalCoefficients(NamedTuple):

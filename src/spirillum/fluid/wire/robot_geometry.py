@@ -12,9 +12,9 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import check_memory
 from spirillum.fluid.wire.stokeslets import Wire, station_count, stations_along
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import End, ProfilePoints, Shape, amplitude_envelope, centreline
+from spirillum.robot.geometry import End, ProfilePoints, Shape
 from spirillum.robot.outline import Outline, body_outline, cylinder_outline, solid_outlines
-from spirillum.robot.tail_form import PLAIN, TailForm
+from spirillum.robot.tail_form import PLAIN, TailForm, amplitude_envelope, centreline
 from spirillum.units import show
 
 _POINTS_PER_TURN = 200

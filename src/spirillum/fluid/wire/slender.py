@@ -20,10 +20,9 @@ from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, 
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import coil_spacing
 from spirillum.robot.limits import Limit, within
 from spirillum.robot.model_options import ModelOptions
-from spirillum.robot.tail_form import ROOT_SHARE, closest_strands
+from spirillum.robot.tail_form import ROOT_SHARE, closest_strands, coil_spacing
 
 FINEST_WIRE_ERROR = 0.004
 """Relative error of speeds with `high` wires: the largest of drag, thrust, torque and speed against resolved wires."""
