@@ -53,10 +53,10 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     more = len(rows_of(answer)) - rows.row_count
     if more:
         yield f"and {more} more quantities: --all"
-    if "band" in answer or (released and "gap" in answer["placement"]):
+    if "gap" in answer["placement"] and "lying" not in answer:
         yield _over_poses(answer, "held" if released else "value")
     if "trial" in answer:
-        yield from released_columns(answer)
+        yield from released_columns(answer, "; its interval: --interval")
     yield from _in_the_lab(answer, released)
     for item in answer.get("published", ()):
         yield _compare_with_published(item)
@@ -92,7 +92,8 @@ def _over_poses(answer: Answer, column: str) -> str:
     if "band" not in answer:
         return given
     ranges = ", ".join(f"{name} {range_words(pose[name])}" for name in ("gap", "pitch") if "low" in pose[name])
-    return f"{given}; low and high over {len(answer['band']['gap']['value'])} more: {ranges}"
+    ends = f"{column} low and high" if column == "held" else "low and high"
+    return f"{given}; {ends} over {len(answer['band']['gap']['value'])} more: {ranges}"
 
 
 def _compare_with_published(item: Answer) -> str:

@@ -24,7 +24,9 @@ class Detail(str):
 
 Block = str | Table  #: A line, a detail or a table of an answer; the first one is its title, or has it.
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "last 2/3 of run", "drive on", "steady part", "held", "trial", "steady")
+_HELD_ENDS = {"low": "held low", "high": "held high"}  # of the column held alone: its band, or a posterior's interval
+_RUN = ("last 2/3 of run", "drive on", "steady part")
+_NUMBERS = ("value", "low", "high", *_RUN, "held", *_HELD_ENDS.values(), "trial", "steady")
 """Columns of numbers, which are never folded: names are."""
 
 
@@ -78,7 +80,7 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
     rows = {name: row for name in (answer if only is None else only) for row in rows_of(answer, [name])}
     ends = ("low", "high") if any(row.low for row in rows.values()) else ()
     columns = answered_columns(answer)
-    table = grid(title, "quantity", "held", *ends, *columns)
+    table = grid(title, "quantity", "held", *(_HELD_ENDS[end] for end in ends), *columns)
     if ends:  # six columns at 80 characters: spaces between them, no lines
         table.box, table.padding, table.pad_edge = SIMPLE_HEAVY, (0, 0, 0, 1), False
     for name, row in rows.items():
@@ -98,8 +100,8 @@ def answered_columns(answer: Answer) -> list[str]:
     return [column for column in RELEASED_COLUMNS if "reason" not in answer.get(column, {"reason": ""})]
 
 
-def released_columns(answer: Answer) -> Iterator[Block]:
-    """What the columns of released motions are, or why one is missing."""
+def released_columns(answer: Answer, how_sure: str = "") -> Iterator[Block]:
+    """What the columns of released motions are, or why one is missing; `how_sure` of a trial without an interval."""
     there = [column for column in RELEASED_COLUMNS if column in answer]
     missing = {column: answer[column]["reason"] for column in there if "reason" in answer[column]}
     for reason in dict.fromkeys(missing.values()):
@@ -108,7 +110,8 @@ def released_columns(answer: Answer) -> Iterator[Block]:
         yield line if "band" in answer and "prepare" in reason else Detail(line)
     if "trial" in there and "trial" not in missing:
         wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
-        yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
+        basis = f"{answer['trial']['assumption']}{'' if 'runs' in answer['trial'] else how_sure}"
+        yield f"trial: released, motor on after {wait}, mean over {duration}; {basis}"
         yield from _over_unknowns(answer["trial"])
         items = [(name, one) for name, one in answer["trial"].items() if isinstance(one, Mapping)]
         lacking = {name: one["reason"] for name, one in items if "reason" in one}
