@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.table import Table
 
 import spirillum as sp
 from spirillum.calibration.fit_warnings import common_warnings
 from spirillum.calibration.parameters import Estimate
 from spirillum.cli import main
-from spirillum.cli.tables.fits import _friction
+from spirillum.cli.tables.fits import _friction, calibration
 
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 WIDE = PRESETS[0]
@@ -72,7 +73,6 @@ def test_an_interval_that_reaches_below_zero_says_so(made: Callable[..., Path]) 
     assert "friction-negative" not in [note.code for note in common_warnings(found.problem, [sure] * 4)]
     (said,) = [n for n in common_warnings(found.problem, [sure, unsure] * 2) if n.code == "friction-negative"]
     assert f"B_eff of {found.experiment.labels()[1]}, ... may be zero or less" in said
-    assert "effective rotary friction B_eff, eq. (18), of 4 tails" in next(map(str, _friction(found.to_dict())))
 
 
 def test_stated_uncertainties_widen_the_intervals_by_their_share(made: Callable[..., Path]) -> None:
@@ -257,9 +257,18 @@ def test_a_narrow_channel_that_drags_less_is_remarked(made: Callable[..., Path])
     assert all("intervals overlap" in words for words in close if "narrower channel has more drag" in words)
 
 
-def test_the_friction_of_one_tail_is_shown_with_its_interval() -> None:
-    friction = {"value": 1.2352e-5, "low": 1.0871e-5, "high": 1.4203e-5, "unit": "N m s/rad"}
-    answer = {"friction": "rotor", "tails": [{"effective_friction": friction}]}
-    for tails, said in ((1, "1.235e-05 (1.087e-05 to 1.42e-05) N m s/rad"), (2, "1.235e-05 N m s/rad")):
-        first, *_ = _friction({**answer, "tails": tails * answer["tails"]})
-        assert f"(friction model rotor): {said}, tail by tail" in first
+@pytest.mark.parametrize(
+    ("factors", "names"), [((1,), ["B_eff"]), ((2, 1, 3), ["B_eff, least of 3 tails", "B_eff, greatest of them"])]
+)
+def test_the_table_gives_b_eff_with_the_intervals_of_its_tails(
+    made: Callable[..., Path], factors: tuple[int, ...], names: list[str]
+) -> None:
+    tails = [
+        {"effective_friction": {"value": 4 * f, "low": 3 * f, "high": 5 * f, "unit": "N m s/rad"}} for f in factors
+    ]
+    answer = fitted(made(**FOUR)).to_dict() | {"tails": tails, "folder": "", "files": ()}
+    (table,) = (block for block in calibration(answer) if isinstance(block, Table))
+    rows = [row for row in zip(*(column.cells for column in table.columns), strict=True) if str(row[0]) in names]
+    ends = (min(factors), max(factors)) if len(factors) > 1 else factors
+    shown = [(name, *(str(by * f) for by in (4, 3, 5)), "N m s/rad") for name, f in zip(names, ends, strict=True)]
+    assert rows == shown

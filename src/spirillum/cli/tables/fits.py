@@ -17,7 +17,8 @@ def calibration(answer: Answer) -> Blocks:
     """Fitted numbers of `calibrate`."""
     counts = f"{counted(answer['rows'], 'row')} of {counted(answer['robots'], 'robot')}"
     yield f"{answer['observations']}{_synthetic(answer)}: {counts}, model {answer['model']}, method {answer['method']}"
-    named = dict(answer["parameters"])
+    friction = _friction_by_name(answer)
+    named = answer["parameters"] | friction
     named |= {f"model discrepancy, {CALLED[name]}": item for name, item in answer["discrepancy"].items()}
     known = {name: item for name, item in answer["error_of_a_trial"].items() if item["value"] is not None}
     named |= {f"error of a trial, {CALLED[name]}": item for name, item in known.items()}
@@ -26,7 +27,8 @@ def calibration(answer: Answer) -> Blocks:
         typical = "what the fit leaves, or a typical one; one tail cannot tell it from wrong fixed numbers"
         misses = "by how much the model misses the mean of a tail, as a standard deviation"
         yield f"model discrepancy: {typical if answer['robots'] == 1 else misses}"
-    yield from _friction(answer)
+    if friction:
+        yield from _friction(answer)
     if answer["method"] != "paper":
         yield Detail("low and high: 95 % interval")
     if "sampler" in answer:
@@ -56,19 +58,20 @@ def _numbers(name: str, item: Answer) -> tuple[str, ...]:
 _MATTERS = 0.1  # relative change of B_eff over that of a constant, from which on the constant is named
 
 
+def _friction_by_name(answer: Answer) -> dict[str, Answer]:
+    """The effective friction of a tail, or the least and the greatest of several."""
+    every = (tail["effective_friction"] for tail in answer["tails"] if "effective_friction" in tail)
+    found = sorted((item for item in every if item["value"] is not None), key=lambda item: float(item["value"]))
+    if len(found) < 2:
+        return dict(zip(["B_eff"], found, strict=False))
+    return {f"B_eff, least of {len(found)} tails": found[0], "B_eff, greatest of them": found[-1]}
+
+
 def _friction(answer: Answer) -> Iterator[str | Detail]:
-    """The effective friction over the tails."""
-    found = [tail["effective_friction"] for tail in answer["tails"] if "effective_friction" in tail]
-    found = [item for item in found if item["value"] is not None]
-    if not found:
-        return
-    low, high = (f"{end(item['value'] for item in found):.4g}" for end in (min, max))
-    only = found[0] if len(found) == 1 and found[0].get("low") is not None else {}
-    interval = f" ({only['low']:.4g} to {only['high']:.4g})" if only else ""
+    """What the effective friction is, and what its interval rests on."""
     yield (
-        f"effective rotary friction B_eff, eq. (18), of {counted(len(found), 'tail')} (friction model "
-        f"{answer['friction']}): {low if low == high else f'{low} to {high}'}{interval} N m s/rad, "
-        "tail by tail in predictions.csv"
+        f"B_eff: effective rotary friction, eq. (18), friction model {answer['friction']}; tail by tail in "
+        "predictions.csv"
     )
     changes = answer.get("effective_friction_exact", {})
     exact = [
