@@ -73,14 +73,15 @@ def test_control_shows_its_verdict_and_the_scores_of_all_controllers() -> None:
 def test_study_shows_its_ranking_first_and_stays_a_dataset() -> None:
     robots = ["biorob2012-wide", "biorob2012-narrow"]
     dataset = sp.study({"models": ["sbt"], "friction": ["rotor"], "robots": robots})
-    speeds = dataset["forward_velocity"].squeeze().values
+    speeds = dataset["forward_velocity_held"].values
     best = robots[int(speeds.argmax())]
     lines = str(dataset).splitlines()
     lead = 100 * (1.0 - speeds.min() / speeds.max())
-    fastest = f"Study: fastest: {best}, {1e3 * speeds.max():.4g} mm/s"
-    assert lines[0] == f"{fastest}, the next is {lead:.0f} % behind, the model's error is 31 %"
+    error = 100 * dataset["error_estimate_held"].values.sum()
+    fastest = f"Study: fastest at a fixed pose by tube: {best}, {1e3 * speeds.max():.4g} mm/s"
+    assert lines[0] == f"{fastest}, the next is {lead:.0f} % behind, the model's error is {error:.2g} %"
     assert [line.split()[0] for line in lines[3:5]] == [robots[number] for number in (-speeds).argsort()]
-    assert dataset._repr_html_().startswith("<table><caption>fastest: ")
+    assert dataset._repr_html_().startswith("<table><caption>fastest at a fixed pose")
     part = dataset.sel(model="sbt")
     assert str(part) == repr(part)
     assert isinstance(part.mean(), xr.Dataset)

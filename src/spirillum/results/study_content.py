@@ -19,8 +19,6 @@ from spirillum.notes import notes_in
 from spirillum.robot.model_options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
 from spirillum.studies.ranking import (
     ENDS,
-    RANKED,
-    SETTLED_BASIS,
     Best,
     RankedRobot,
     StudyRanking,
@@ -56,11 +54,11 @@ def ranking_content(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str,
         "message": ranking.message,
         "basis": f"model {ranking.model}, friction {ranking.friction}"
         + (", the channel's walls not computed" if ranking.walls else "")
-        + (f"; {SETTLED_BASIS}" if ranking.settled else ""),
-        "first": order_in_words(settled=ranking.settled, held=ranking.held).capitalize(),
+        + (f"; {ranking.basis}" if ranking.basis else ""),
+        "first": order_in_words(ranking.lead, held=ranking.held).capitalize(),
         "ends": ENDS.get(ranking.kind, ""),
         "best": [best_in_words(best.to_dict(), _size(best), held=ranking.held) for best in ranking.best],
-        "header": ["robot", *(RANKED[name].heading(unit) for name, unit in units.items())],
+        "header": ["robot", *(ranking.heading(name, unit) for name, unit in units.items())],
         "rows": [[robot.name, *(_ranked_cell(robot, name, units[name]) for name in units)] for robot in first],
         "more": len(ranking.robots) - len(first),
     }

@@ -2,8 +2,9 @@
 
 One model and one friction model rank all robots: the model that computes the channel's walls where the study
 has one, else the first that solves for the flow, else its first; the reading that the robots have themselves where the
-study has it. Robots that are released too (`settled`) are ordered by their speed in steady motion. Bands and intervals
-are those of the study. A band goes over poses that robots may share, such as a gap: at how many of them the fastest
+study has it. Robots that are released too (`settled`) are ordered by their speed in steady motion, and where that model
+leaves the channel's walls out, by their speed held at a pose by `tube` if all of them have it. Bands and intervals are
+those of the study. A band goes over poses that robots may share, such as a gap: at how many of them the fastest
 robot is the fastest is more informative than how far the bands overlap.
 """
 
@@ -61,6 +62,8 @@ SETTLED_BASIS = (
     "steady: by model tube, after release, in the steady state; all else: by the model above, at a fixed pose"
 )
 """Assumptions of the speed after release that the other quantities do not share."""
+BASIS = {STEADY_SPEED: SETTLED_BASIS, HELD: "tube: its walls computed, at a fixed pose"}
+"""What the speed that orders the robots rests on, where it is not that of the ranking's model."""
 ENDS = {"band": "over the gaps and pitches that are not given", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
 
@@ -68,6 +71,13 @@ ENDS = {"band": "over the gaps and pitches that are not given", "interval": "95 
 def unit_of_ranked(name: str) -> str:
     """SI unit of a quantity that ranks robots."""
     return unit_of("forward_velocity" if name in _BESIDE else name)
+
+
+def ranked_as(name: str, lead: str, model: str) -> QuantityRanking:
+    """Return how a quantity ranks robots; a model's own speed has its name where that of `tube` leads."""
+    if (name, lead) == ("forward_velocity", HELD):
+        return QuantityRanking(model, f"fastest by {model}, walls not computed", 1.0)
+    return RANKED[name]
 
 
 class RankedRobot(NamedTuple):
@@ -144,7 +154,7 @@ class StudyRanking:
         if not self.robots:
             return "no robot has an answer"
         first = self.robots[0]
-        by = STEADY_SPEED if np.isfinite(first.values.get(STEADY_SPEED, np.nan)) else "forward_velocity"
+        by = self.lead if np.isfinite(first.values[self.lead]) else "forward_velocity"
         speed, low, high = (of[by] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
@@ -152,9 +162,18 @@ class StudyRanking:
         return best_in_words(next(best for best in self.best if best.quantity == by).to_dict(), size, held=self.held)
 
     @property
-    def settled(self) -> bool:
-        """Whether robots were released, and are ordered by the speed in steady motion."""
-        return STEADY_SPEED in self.quantities
+    def lead(self) -> str:
+        """Name of the speed by which robots are ordered."""
+        return next(iter(self.quantities), "forward_velocity")
+
+    def heading(self, name: str, unit: str) -> str:
+        """Title and unit of the column or axis of a quantity."""
+        return ranked_as(name, self.lead, self.model).heading(unit)
+
+    @property
+    def basis(self) -> str:
+        """What that speed rests on, where it is not that of the model; else empty."""
+        return BASIS.get(self.lead, "")
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -169,7 +188,7 @@ class StudyRanking:
             "walls_left_out": self.walls,
             "held": self.held,
             "low_and_high": self.kind or "none",
-            **({"settled": SETTLED_BASIS} if self.settled else {}),
+            **({"settled": self.basis} if self.lead == STEADY_SPEED else {}),
             "best": [best.to_dict() for best in self.best],
             "robots": [robot.to_dict() for robot in self.robots[:_MOST]],
         }
@@ -178,9 +197,9 @@ class StudyRanking:
 _AT_A_POSE = " at a fixed pose"
 
 
-def order_in_words(*, settled: bool, held: bool) -> str:
+def order_in_words(lead: str, *, held: bool) -> str:
     """Return by which speed robots are ordered."""
-    return "fastest once settled first" if settled else f"fastest{_AT_A_POSE} first" if held else "fastest first"
+    return f"{RANKED[lead].superlative}{_AT_A_POSE if held else ''} first"
 
 
 def best_in_words(best: Mapping[str, Any], size: str = "", *, held: bool = False) -> str:
@@ -241,6 +260,9 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     known = ["forward_velocity", "hydrodynamic_efficiency", "motor_current" if has_motor else "shaft_power"]
     beside = [name for name in _BESIDE if name in chosen and bool(np.isfinite(chosen[name].values).any())]
     known[1:1] = [name for name in beside if name != STEADY_SPEED]
+    answered = np.isfinite(chosen["forward_velocity"].values)
+    if HELD in beside and bool(np.isfinite(chosen[HELD].values[answered]).all()):
+        known.insert(0, known.pop(known.index(HELD)))
     if STEADY_SPEED in beside:
         known.insert(0, STEADY_SPEED)
     values = {name: _flat(chosen, name, names) for name in known}
@@ -258,8 +280,12 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
         )
         for index in order
     }
-    judged = sorted(known, key=(HELD, TRIAL).__contains__)  # the columns beside the model's own last
-    best = tuple(_best(chosen, name, values[name], ranked) for name in judged if np.isfinite(values[name][order]).any())
+    judged = [known[0], *sorted(known[1:], key=(HELD, TRIAL).__contains__)]  # the columns beside the model's own last
+    best = tuple(
+        _best(chosen, name, values[name], ranked, ranked_as(name, known[0], model))
+        for name in judged
+        if np.isfinite(values[name][order]).any()
+    )
     placed, settled = SWIMMER_MODELS[model].placed, STEADY_SPEED in beside
     held = walled and placed and not settled
     return StudyRanking(
@@ -302,8 +328,10 @@ def _ends(chosen: xr.Dataset, known: list[str], names: list[str]) -> tuple[dict[
     return found[0], found[1], kind
 
 
-def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, RankedRobot]) -> Best:
-    _title, word, sign = RANKED[name]
+def _best(
+    chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, RankedRobot], by: QuantityRanking
+) -> Best:
+    _title, word, sign = by
     among = np.array(list(ranked))
     winner = int(among[np.nanargmax(sign * values[among])])
     finite = values[among][np.isfinite(values[among])]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from rich.markup import escape
 from rich.table import Table
@@ -23,7 +23,7 @@ from spirillum.cli.tables.parts import (
 from spirillum.designs.design_result import ALTERNATIVES
 from spirillum.display import counted, percent
 from spirillum.notes import notes_in_answer
-from spirillum.studies.ranking import ENDS, RANKED, STEADY_SPEED, best_in_words, order_in_words
+from spirillum.studies.ranking import ENDS, HELD, STEADY_SPEED, best_in_words, order_in_words, ranked_as
 from spirillum.units import display_unit, in_unit
 
 
@@ -77,9 +77,11 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
         why = [str(note) for note in notes_in_answer(answer) if note.code == "without-answer"]
         yield f"no robot has an answer{': ' if why else ''}{'; '.join(why)}"
         return
-    columns = [column for name in robots[0] if name != "robot" for column in _columns(robots, name)]
+    _, lead, *_ = robots[0]
+    titles = {name: ranked_as(name, lead, ranking["model"]).heading for name in robots[0] if name != "robot"}
+    columns = [column for name, heading in titles.items() for column in _columns(robots, name, heading)]
     walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
-    order = order_in_words(settled="settled" in ranking, held=ranking["held"])
+    order = f"{order_in_words(lead, held=ranking['held'])}{'; beside it' if lead == HELD else ''}"
     found = grid(f"{order}: model {ranking['model']}, friction {ranking['friction']}{walls}", "", "robot")
     found.columns[1].no_wrap = all(len(item["robot"]) <= _WHOLE for item in robots)
     split = len(columns) >= _MANY
@@ -98,7 +100,7 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
         yield Detail(f"low, high: {ENDS[ranking['low_and_high']]}{where}")
 
 
-def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]:
+def _columns(robots: Sequence[Answer], name: str, heading: Callable[[str], str]) -> list[tuple[str, list[str]]]:
     """Titles and cells of a quantity: its values, of the speed also the ends of its band."""
     own = robots[0][name]["unit"]
     if not any(item[name]["value"] for item in robots):
@@ -109,7 +111,7 @@ def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]
     ends = [end for end in ("low", "high") if with_ends and any(end in item[name] for item in robots)]
     return [
         (
-            RANKED[name].heading(shown) if end == "value" else end,
+            heading(shown) if end == "value" else end,
             [cell(item[name], shown, end) for item in robots],
         )
         for end in ("value", *ends)

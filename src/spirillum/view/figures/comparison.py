@@ -17,7 +17,7 @@ from spirillum.arrays import Values
 from spirillum.display import percent
 from spirillum.dynamics.comparison import RELEASED_EFFECT, ModelComparison, estimated_error
 from spirillum.errors import InputError
-from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, Best, RankedRobot, StudyRanking, unit_of_ranked
+from spirillum.studies.ranking import ENDS, Best, RankedRobot, StudyRanking, unit_of_ranked
 from spirillum.swimming.motions import ASSUMPTION
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.preparation import WALLED
@@ -65,7 +65,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
     names = [name for name in ranking.quantities if any(np.isfinite(robot.values[name]) for robot in robots)]
     title = fill(plain(ranking.message[:1].upper() + ranking.message[1:], 160), _WIDE)
     by = [f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}." if ranking.walls else "")]
-    by += [f"{SETTLED_BASIS[:1].upper()}{SETTLED_BASIS[1:]}."] if ranking.settled else []
+    by += [f"{ranking.basis[:1].upper()}{ranking.basis[1:]}."] if ranking.basis else []
     if any(np.isfinite(error) for robot in robots for error in robot.error.values()):
         by.append(f"Bars with caps: {_ERROR}; {_PALE}.")
     more = _LINE * title.count("\n") + _SMALL_LINE * (len(by) - 1)
@@ -79,6 +79,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
             name,
             next((best for best in ranking.best if best.quantity == name and not best.alike), None),
             ticks,
+            ranking.heading(name, "1"),
         )
     first = panels[0][0]
     first.set_yticks(range(len(robots)), distinct_labels([robot.name for robot in robots], 40))
@@ -90,7 +91,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
     return figure
 
 
-def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: Best | None, ticks: int) -> None:
+def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: Best | None, ticks: int, title: str) -> None:
     """One quantity of all robots: points, lines over their bands, and bars over the model's stated error."""
     values, low, high, error = (
         np.array([getattr(robot, which)[name] for robot in robots]) for which in ("values", "low", "high", "error")
@@ -109,7 +110,7 @@ def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: Best 
     )  # fmt: skip
     for chosen, face in ((winner, colour), (within, _TINT), (~winner & ~within, "white")):
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
-    panel.set_xlabel(RANKED[name].title + ("" if scale.unit == "1" else f" ({scale.unit})"))
+    panel.set_xlabel(title + ("" if scale.unit == "1" else f" ({scale.unit})"))
     panel.xaxis.set_major_locator(MaxNLocator(ticks))
     panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values + bar, high])))) or 1.0)
     panel.tick_params(axis="y", length=0)
