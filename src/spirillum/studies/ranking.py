@@ -62,7 +62,7 @@ SETTLED_BASIS = (
     "steady: by model tube, after release, in the steady state; all else: by the model above, at a fixed pose"
 )
 """Assumptions of the speed after release that the other quantities do not share."""
-BASIS = {STEADY_SPEED: SETTLED_BASIS, HELD: "tube: its walls computed, at a fixed pose"}
+BASIS = {STEADY_SPEED: SETTLED_BASIS, HELD: "tube: the channel's walls computed, at a fixed pose"}
 """What the speed that orders the robots rests on, where it is not that of the ranking's model."""
 ENDS = {"band": "over the gaps and pitches that are not given", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""

@@ -87,7 +87,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
     figure.suptitle(title, x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
     below = (0.32 + _LINE * title.count("\n")) / figure.get_figheight()
     figure.text(0.02, 1.0 - below, "\n".join(by), ha="left", va="top", size="small")
-    figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.14 / figure.get_figheight()))
+    figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - _SMALL_LINE * len(by) / figure.get_figheight()))  # below the title
     return figure
 
 
