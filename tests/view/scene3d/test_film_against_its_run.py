@@ -175,4 +175,6 @@ def test_a_film_says_how_fast_the_robot_swims() -> None:
     run = xr.Dataset({"mean_forward_velocity_on": 1.53456e-4})
     assert _about(run, "tube") == "model tube, mean velocity 0.1535 mm/s with the drive on"
     assert _about(run / 10.0, "") == "mean velocity 15.35 µm/s with the drive on"
+    slow = run.assign(mean_tail_rotation_rate_on=2.0) / 10.0
+    assert _about(slow, "") == "mean velocity 0.01535 mm/s with the drive on"  # as the answer of `simulate` gives it
     assert _about(xr.Dataset(), "tube") == "model tube"

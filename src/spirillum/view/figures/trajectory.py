@@ -169,12 +169,17 @@ def _around(dataset: xr.Dataset) -> str:
     return f"goes {abs(around):.2g}° around the tube{sense}"
 
 
+def mean_velocity_in_words(dataset: xr.Dataset) -> list[str]:
+    """Return the mean velocity of a run, in the unit of its robot's other speeds; nothing where the run has none."""
+    if np.isnan(mean := float(dataset.get("mean_forward_velocity_on", np.nan))):
+        return []
+    unit = speed_unit(mean, float(dataset.get("mean_tail_rotation_rate_on", np.nan)))
+    return [f"mean velocity {show(mean, unit)} with the drive on"]
+
+
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
     attrs = dataset.attrs
-    found = [_around(dataset)] if in_tube else []
-    if (mean := float(dataset.get("mean_forward_velocity_on", np.nan))) == mean:
-        unit = speed_unit(mean, float(dataset.get("mean_tail_rotation_rate_on", np.nan)))
-        found.insert(0, f"mean velocity {show(mean, unit)} with the drive on")
+    found = [*mean_velocity_in_words(dataset), *([_around(dataset)] if in_tube else [])]
     found += [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
     if in_tube:
         named = {"ends": "ends", "friction_coefficient": "dry friction"}

@@ -23,7 +23,7 @@ from spirillum.swimming.motions import ASSUMPTION
 from spirillum.units import display_unit, show
 from spirillum.view.figures.scene import FAINT, INK, round_length
 from spirillum.view.figures.style import COLOURS, with_micro
-from spirillum.view.figures.trajectory import silhouette
+from spirillum.view.figures.trajectory import mean_velocity_in_words, silhouette
 from spirillum.view.scene3d.rendering import FILMS, video_writer
 from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
 from spirillum.view.scene3d.show import checked_size, glass_around, scene_points
@@ -200,11 +200,7 @@ def film(
 
 def _about(dataset: xr.Dataset, model: str) -> str:
     """Line below the title: the model, and how fast the robot swims."""
-    found = [f"model {model}"] if model else []
-    if "mean_forward_velocity_on" in dataset:
-        mean = float(dataset["mean_forward_velocity_on"])
-        found.append(f"mean velocity {with_micro(show(mean, display_unit(mean, 'm/s')))} with the drive on")
-    return ", ".join(found)
+    return ", ".join([*([f"model {model}"] if model else []), *map(with_micro, mean_velocity_in_words(dataset))])
 
 
 @dataclass
