@@ -11,7 +11,7 @@ from tests.support.commands import run_command
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.measurement.observations import ObservationRow, without_copies
+from spirillum.measurement.observations import ObservationRow, read_observations, without_copies
 from spirillum.robot.batch import RobotBatch
 
 WIDE = "biorob2012-wide"
@@ -198,6 +198,27 @@ def test_rows_that_state_other_intervals_are_no_copies() -> None:
     kept, notes = without_copies([row, other, replace(row, row=4, body_rate=-0.0)])
     assert [item.row for item in kept] == [2, 3]
     assert [note.code for note in notes] == ["copy-of-a-trial"]
+
+
+def test_a_row_whose_third_rate_follows_from_the_others_is_a_copy_of_one_that_states_it(tmp_path: Path) -> None:
+    """Whichever is left out; rows that state motor rates of their own are trials of their own."""
+    file = tmp_path / "observations.csv"
+    rows = [
+        "0.51,1.45,-0.036,",
+        "0.51,1.45,-0.036,1.486",
+        "0.51,,-0.036,1.486",
+        "0.51,1.45,,1.486",
+        "0.51,1.45,-0.036,1.5",
+    ]
+    names = (
+        "channel_diameter_mm,wavelength_mm,amplitude_mm,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz,motor_rate_Hz"
+    )
+    file.write_text("\n".join([names, *(f"40,25,2.5,{row}" for row in rows)]) + "\n")
+    kept, notes = without_copies(read_observations(file))
+    assert [item.row for item in kept] == [3, 6]
+    assert [str(note).partition(";")[0] for note in notes] == [
+        "rows 2, 4, 5: equal to row 3 in every number: a copy does not count"
+    ]
 
 
 def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None:

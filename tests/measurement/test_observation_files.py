@@ -72,6 +72,8 @@ def test_one_trial_keeps_the_interval_that_it_states(tmp_path: Path) -> None:
         ([HEADER, "a,40,25,2.5,1,1e7,1,-0.1"], "a number up to 1e+06"),
         ([HEADER, "a,40,25,2.5,1,1_0,1,-0.1"], "'1_0'"),
         ([HEADER, "a,40,25,2.5,1,1,1,-0.1", "a,40,25,2.5,1,2,1,-0.1"], "rows 2 and 3 are both trial 1"),
+        ([HEADER, "a,40,25,2.5,1,1,1,-0.1", "a,40,25,2.5,01,2,1,-0.1"], "rows 2 and 3 are both trial 1"),
+        ([HEADER, "a,40,25,2.5,10,1,1,-0.1", "a,40,25,2.5,1.0e1,2,1,-0.1"], "rows 2 and 3 are both trial 10"),
         (
             ["channel_diameter_mm,wavelength_mm,amplitude_mm,trials,tail_rate_Hz", "40,25,2.5,5,1", "40,25,2.5,5,2"],
             "rows 2 and 3",

@@ -63,7 +63,7 @@ class ObservationRow:
     trials: int  #: 1 for a trial, more for a mean.
     intervals: tuple[float, float, float, float]
     """Half widths of 95 % intervals in the same order: of a trial, or of a mean over trials."""
-    trial: str = ""  #: Number or name of the trial, where the file gives one.
+    trial: str = ""  #: Number of the trial without leading zeros, or its name, where the file gives one.
     motor_derived: bool = False  #: Whether the motor's rate was not observed itself.
 
     @property
@@ -136,13 +136,14 @@ def _observation(row: TableRow) -> ObservationRow:
     number = number_in(row.text("trial"))
     if not math.isnan(number) and not number.is_integer():
         raise row.error("trial", row.text("trial"), "a whole number, or a name")
+    trial = row.text("trial") if math.isnan(number) else f"{number:.0f}"  # 1, 01 and 1.0 are one trial
     a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     trials = _trials(row)
     if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
         d = math.hypot(b, c) if trials == 1 else b + c
     return ObservationRow(
         row.line, row.text("robot"), channel_diameter, wavelength, amplitude, velocity, tail, body, motor,
-        trials, (a, b, c, d), row.text("trial"), motor_derived,
+        trials, (a, b, c, d), trial, motor_derived,
     )  # fmt: skip
 
 
@@ -212,17 +213,27 @@ def check_driven(path: str | Path, observations: Sequence[ObservationRow], robot
 
 
 def without_copies(observations: Iterable[ObservationRow]) -> tuple[list[ObservationRow], tuple[Note, ...]]:
-    """The rows without those that repeat another one of their tail in every number, and a note on each such row."""
+    """The rows without those that repeat another one of their tail in every number, and a note on each such row.
+
+    Two of the three rates give the third: a row that leaves one out repeats a row that states it.
+    """
+    items = list(observations)
     alike: dict[tuple[object, ...], list[ObservationRow]] = {}
-    for item in observations:
-        numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate, *item.intervals)
-        alike.setdefault((item.tail, repr([number + 0.0 for number in numbers])), []).append(item)
-    notes = (
-        Note.named("copied-trials", first=items[0].row, rows=rows_in_words(item.row for item in items[1:]))
-        for items in alike.values()
-        if len(items) > 1
-    )
-    return [items[0] for items in alike.values()], tuple(notes)
+    for item in items:
+        tail = item.motor_rate + item.body_rate if math.isnan(item.tail_rate) else item.tail_rate
+        body = item.tail_rate - item.motor_rate if math.isnan(item.body_rate) else item.body_rate
+        numbers = (item.forward_velocity, tail, body, *item.intervals[:3])
+        alike.setdefault((item.tail, *(f"{number + 0.0:.9g}" for number in numbers)), []).append(item)
+    copies: dict[int, list[int]] = {}
+    for rows in alike.values():
+        first: dict[str, int] = {}
+        for item in sorted(rows, key=lambda row: row.motor_derived):
+            motor = next(iter(first), "") if item.motor_derived else f"{item.motor_rate:.9g}"
+            if first.setdefault(motor, item.row) != item.row:
+                copies.setdefault(first[motor], []).append(item.row)
+    notes = (Note.named("copied-trials", first=row, rows=rows_in_words(sorted(of))) for row, of in copies.items())
+    left_out = {row for of in copies.values() for row in of}
+    return [item for item in items if item.row not in left_out], tuple(notes)
 
 
 def summarised(observations: Iterable[ObservationRow]) -> dict[tuple[float, float, float], RobotObservations]:
