@@ -250,6 +250,14 @@ def test_an_impossible_seal_is_one_sentence(overrides: dict[str, Any], words: st
     assert words in str(refused.value)
 
 
+def test_a_robot_file_says_before_a_picture_that_its_seal_is_too_long() -> None:
+    robot = load(WIDE, **{"seal.length": "27 mm"})
+    with pytest.raises(InputError) as refused:
+        robot_mesh(robot)
+    assert str(refused.value) in [str(note) for note in robot.notes if note.code == "robot-file-doubtful"]
+    assert load(WIDE, **{"seal.length": "26 mm"}).notes == load(WIDE).notes
+
+
 @pytest.mark.parametrize("fineness", [0.0, -1.0, float("nan"), 1e6])
 def test_fineness_out_of_range_is_refused(fineness: Any) -> None:
     with pytest.raises(InputError, match=r"fineness = .*; allowed: 0\.1 to 20"):

@@ -341,6 +341,8 @@ def _doubts(robot: Robot) -> Iterator[Note]:
     own, whole = None if robot.motor is None else robot.motor.joint_rotor_friction, robot.friction.effective
     if own is not None and whole is not None and whole < own:
         yield Note.named("friction-below-rotor", whole=show(whole, "N m s/rad"), own=show(own, "N m s/rad"))
+    if (doubt := robot.seal_doubt) is not None:
+        yield doubt
     yield from smoothing_notes(robot.tail.form)
 
 

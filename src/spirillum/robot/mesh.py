@@ -22,7 +22,6 @@ from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, Surface, mass_properties, profile_of, revolved, rod, swept
 from spirillum.robot.tail_form import Centreline, centreline
-from spirillum.units import show
 
 Colour = tuple[float, float, float]
 
@@ -129,14 +128,8 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
     seal = robot.seal
     if seal is None:
         return _piece("body", "body", revolved(profile_of(outline, around), around), ("body",), (COLOURS["body"],))
-    body = robot.body
-    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
-    longest = body.length - nose
-    if seal.length > longest * (1.0 + 1e-12):
-        raise InputError(
-            f"seal.length = {show(seal.length, 'mm')}; allowed: at most {show(longest, 'mm')}, where the nose of the "
-            "body begins, or seal = 'none' for a plain body"
-        )
+    if (doubt := robot.seal_doubt) is not None:
+        raise InputError(str(doubt))
     front, stripes = seal.length - 0.5 * robot.body.length, len(seal.stripes)
     profile = profile_of(outline, around, (front,))
     sectors = max(stripes, 1)

@@ -12,6 +12,7 @@ from pydantic import model_validator
 from spirillum.data_tables import rows_of
 from spirillum.files import MARK
 from spirillum.kernels.core import AXIAL_CONSTANT, AXIAL_SLOPE, MOTOR_SIZE, windings
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import default_of, field_values, refuse
 from spirillum.robot.limits import assembly_limits, broken
@@ -112,6 +113,16 @@ class Robot(RobotTables):
             width = max(len(name) for name, _ in rows)
             lines += [title, *(f"  {name:<{width}}  {words}" for name, words in rows)]
         return "\n".join(lines)
+
+    @property
+    def seal_doubt(self) -> Note | None:
+        """What is wrong with a seal that reaches beyond the side of the body; None where nothing is."""
+        body, seal = self.body, self.seal
+        nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
+        longest = body.length - nose
+        if seal is None or seal.length <= longest * (1.0 + 1e-12):
+            return None
+        return Note.named("seal-beyond-nose", own=show(seal.length, "mm"), most=show(longest, "mm"))
 
     @property
     def _tail_size(self) -> str:
