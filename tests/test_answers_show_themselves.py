@@ -1,9 +1,13 @@
 """Answers in Python: text and HTML with units, tab completion, figures."""
 
+import ast
+from pathlib import Path
+
 import pytest
 import xarray as xr
 
 import spirillum as sp
+from spirillum.answer_entries import ENTRIES
 from spirillum.display import DisplayMixin, html_of, text_of
 
 ANSWER = {
@@ -138,3 +142,17 @@ def test_plot_draws_by_the_kind_of_answer(tmp_path) -> None:
     assert len(sp.plot(sp.control("biorob2012-wide", task, plant={"model": "rft"})).figure.axes) == 3
     with pytest.raises(sp.InputError, match="answer = int has no figure"):
         sp.plot(3)
+
+
+def test_entries_of_answers_are_declared_of_what_their_classes_have() -> None:
+    source = Path(sp.__file__).parent
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in source.rglob("*.py")]
+    classes = {node.name: node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)}
+    for name, rows in ENTRIES.items():
+        own = classes[name]
+        known = {node.name for node in own.body if isinstance(node, ast.FunctionDef)}
+        known |= {ast.unparse(node.target) for node in own.body if isinstance(node, ast.AnnAssign)}
+        known |= {str(word.arg) for node in ast.walk(own) if isinstance(node, ast.Call) for word in node.keywords}
+        named = [row.attribute or row.entry for row in rows] + [row.given for row in rows if row.given]
+        named += [row.unit.strip("{}") for row in rows if row.unit.startswith("{")]
+        assert {path.partition(".")[0] for path in named if not path.startswith("=")} - known == set(), name

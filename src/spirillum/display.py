@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
+from spirillum.answer_entries import answer_of
 from spirillum.notes import Note, headline_cautions, notes_in_answer, notes_of
 from spirillum.quantities import QUANTITIES
 from spirillum.units import among, in_unit, speed_unit
@@ -73,12 +73,12 @@ def times(ratio: float) -> str:
     return f"{ratio:.0f}x" if 10 <= abs(ratio) < 1e5 else f"{ratio:.2g}x"
 
 
-class DisplayMixin(ABC):
+class DisplayMixin:
     """What every answer gives to `print` and to notebooks: its quantities with units, and its notes."""
 
-    @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """The answer as data, as the command of the same name prints it with `--json`."""
+        return answer_of(self)
 
     @property
     def notes(self) -> tuple[Note, ...]:

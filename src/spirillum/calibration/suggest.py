@@ -25,12 +25,12 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import channel_of, robots_by_channel, tail_words, with_tail
 from spirillum.calibration.fit import RobotSource, load_robots
 from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.display import DisplayMixin, counted
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
 from spirillum.fitted.fit import fit_of_posterior
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
@@ -91,28 +91,8 @@ class Suggestion(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum suggest --json`."""
-        rows = [
-            {
-                "channel_diameter": quantity(item.channel_diameter, "m"),
-                "wavelength": quantity(item.wavelength, "m"),
-                "amplitude": quantity(item.amplitude, "m"),
-                "expected_information": quantity(item.gain, "bit"),
-                "behind_the_best": quantity(item.behind, "bit", standard_error=item.behind_error),
-                "tied_with_the_best": item.tied,
-                "narrowing": {name: quantity(value, "1") for name, value in item.narrowing.items()},
-            }
-            for item in self.candidates
-        ]
-        content = {
-            "posterior": self.posterior.source,
-            "synthetic": self.posterior.synthetic,
-            "model": self.posterior.model,
-            "model_reason": fitted_with(self.posterior.source),
-            "trials": self.trials,
-            **({} if self.answer == HELD else {"answer": self.answer}),
-            "candidates": rows,
-        }
-        return envelope("suggestion", content, self.warnings)
+        motion = "" if self.answer == HELD else self.answer
+        return answer_of(self, motion=motion, model_reason=fitted_with(self.posterior.source))
 
 
 def suggest(

@@ -21,7 +21,6 @@ from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.run_file import Poses, open_run, poses_of, robot_of, rolled
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import MARK, atomic_write, guard_inputs, output_target
 from spirillum.optional_dependencies import import_optional
@@ -143,16 +142,6 @@ class Recording(DisplayMixin):
     robot: Robot  #: The robot of the run.
     duration: float  #: Length of the run, s.
     topics: Mapping[str, int]  #: Number of messages by topic.
-
-    def to_dict(self) -> dict[str, Any]:
-        """Content of `spirillum export run.nc run.mcap --json`."""
-        content = {
-            "robot": self.robot.name,
-            "file": str(self.path),
-            "duration": quantity(self.duration, "s"),
-            "topics": dict(self.topics),
-        }
-        return envelope("recording", content, ())
 
 
 def export_run(

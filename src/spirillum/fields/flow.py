@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity, with_notes_last
+from spirillum.envelope import quantity, with_notes_last
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fields.fluid_field import FluidField, checked_points, flow_field
 from spirillum.fields.grid import PLANE_RESOLUTION, VOLUME_RESOLUTION, PointGrid, box_around, dataset_on, plane_around
@@ -84,25 +84,6 @@ class Flow(DisplayMixin):
         if self.robot.channel is None or self.seat is not None:
             return self.prediction.warnings
         return (*self.prediction.warnings, Note.named("flow-without-walls"))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The motion and its settings, as data."""
-        motion = self.prediction
-        content = {
-            "robot": self.robot.name,
-            **motion.answered_by,
-            "friction": motion.friction,
-            "calibrated": motion.calibrated,
-            "frame": self.frame,
-            "phase": quantity(self.phase, "rad"),
-            **{name: quantity(getattr(motion, name), unit_of(name)) for name in _MOTION},
-            **({} if self.seat is None else {"plug_velocity": quantity(motion.plug_velocity, "m/s")}),
-            "held_force": quantity(self.held_force, "N", direction="sideways"),
-            **({} if self.lifted == 0.0 else {"lifted": quantity(self.lifted, "m")}),
-            "placement": motion.placement,
-            "references": list(motion.references),
-        }
-        return envelope("flow", content, self.warnings)
 
     def with_held_force(self) -> Flow:
         """This flow with the sideways force that the fluid's traction amounts to."""

@@ -13,12 +13,10 @@ from spirillum.argument_validation import as_duty
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.axial_robot import INPUTS, STATES, AxialRobot, axial_robot, motion, outputs, rates, slopes
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
-from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.preparation import AUTO
@@ -38,16 +36,6 @@ class LinearSystem(DisplayMixin):
     """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
     time_constant: float  #: Of the motor's current there, s; path, angles and charge only add up.
     warnings: tuple[Note, ...] = ()  #: What to be careful about, a sentence each.
-
-    def to_dict(self) -> dict[str, Any]:
-        """The point, and the time constant there, as data; the matrices are those of `system`."""
-        point = {**self.inputs, **self.outputs}
-        content = {
-            "robot": str(self.system.name),
-            "time_constant": quantity(self.time_constant, "s"),
-            **{name: quantity(value, unit_of(name)) for name, value in point.items()},
-        }
-        return envelope("linear-system", content, self.warnings)
 
 
 def control_system(

@@ -21,7 +21,6 @@ from typing import Any, Self
 
 from spirillum.argument_validation import as_duty, as_number, validate_arguments
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_range, clipped
 from spirillum.optional_dependencies import import_optional
 from spirillum.units import KINDS, as_given, parse_option
@@ -272,17 +271,6 @@ class RemoteRun(DisplayMixin):
     duty: float  #: Duty of the motor, in steps of 0.001.
     duration: float  #: How long it was on, s.
     watchdog: float  #: Time after which the far end switches off by itself, s.
-
-    def to_dict(self) -> dict[str, Any]:
-        """The answer of `spirillum remote --json`."""
-        content = {
-            "port": self.port,
-            "name": self.name,
-            "duty": quantity(self.duty, "1"),
-            "time_on": quantity(self.duration, "s"),
-            "watchdog": quantity(self.watchdog, "s"),
-        }
-        return envelope("remote", content, ())
 
 
 def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: int = _BAUD) -> RemoteRun:

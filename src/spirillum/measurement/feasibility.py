@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from spirillum.answer_entries import answer_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import quantity
 from spirillum.errors import InputError, check_range
 from spirillum.measurement.setup_template import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
@@ -55,12 +56,6 @@ class Check:
     decides: bool  #: Whether its failure makes the experiment infeasible; otherwise it is a warning.
     sentence: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON."""
-        numbers = {"value": quantity(self.value, self.unit), "limit": quantity(self.limit, self.unit)}
-        words = {"passed": self.passed, "decides": self.decides, "sentence": self.sentence}
-        return {"name": self.name, **numbers, **words}
-
 
 @dataclass(frozen=True, repr=False)
 class Feasibility(DisplayMixin):
@@ -92,25 +87,11 @@ class Feasibility(DisplayMixin):
             for name, (value, source) in self.expected.items()
         }
         intervals = {
-            name: {
-                "half_width": quantity(reach, units.get(name, "rad/s")),
-                "share": share if math.isfinite(share) else None,
-            }
+            name: {"half_width": quantity(reach, units.get(name, "rad/s")), "share": share}
             for name, (reach, share) in self.intervals.items()
         }
-        content = {
-            "robot": self.robot.name,
-            "setup": self.setup,
-            "feasible": self.feasible,
-            "expected": expected,
-            "checks": [check.to_dict() for check in self.checks],
-            "time_measured": quantity(self.measured, "s"),
-            "intervals": intervals,
-            "scale_uncertainty": math.sqrt(sum(share**2 for share in self.shares.values())),
-            "scale_sources": dict(self.shares),
-            "basis": _BASIS,
-        }
-        return envelope("feasibility", content, self.warnings)
+        total = math.sqrt(sum(share**2 for share in self.shares.values()))
+        return answer_of(self, expected=expected, intervals=intervals, total=total, basis=_BASIS)
 
 
 def feasibility(

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import checked_path, new_file, output_target
 from spirillum.measurement.setup_template import KNOWN, setup_text, toml_value
@@ -47,14 +47,6 @@ class Finding:
     field: str = ""  #: Field of the setup that it fills in; empty where there is none.
     pixels: tuple[tuple[tuple[float, float], ...], ...] = ()  #: For drawing: lines through pixels (u, v).
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON."""
-        lines = [[list(point) for point in line] for line in self.pixels]
-        return {
-            "name": self.name, "value": self.value, "unit": self.unit, "confidence": self.confidence,
-            "sentence": self.sentence, "field": self.field, "pixels": lines,
-        }  # fmt: skip
-
 
 @dataclass(frozen=True, repr=False)
 class Proposal(DisplayMixin):
@@ -75,17 +67,7 @@ class Proposal(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        content = {
-            "film": self.film,
-            "width": self.size[0],
-            "height": self.size[1],
-            "robot": self.robot,
-            "file": self.file,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "to_fill": [{"field": field, "sentence": sentence} for field, sentence in self.to_fill],
-            "text": self.text,
-        }
-        return envelope("setup-proposal", content, self.warnings)
+        return answer_of(self, to_fill=[{"field": field, "sentence": sentence} for field, sentence in self.to_fill])
 
 
 def propose_setup(

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.arrays import Flags, PerRobot, Samples
 from spirillum.data_tables import rows_of
 from spirillum.display import DisplayMixin
@@ -207,20 +208,7 @@ class SteadyState:
 
     def to_dict(self) -> dict[str, Any]:
         """The object `lying` of an answer."""
-        low, high = self.gap_range
-        over = "a circuit" if self.state == "goes around" else "a turn of the tail"
-        return {
-            "state": self.state,
-            "statement": self.statement,
-            "azimuth": quantity(self.azimuth, "rad"),
-            "gap": quantity(self.gap, "m", low=low, high=high, kind="range", over=over),
-            "wall_pitch": quantity(self.pitch, "rad"),
-            "wall_yaw": quantity(self.yaw, "rad"),
-            "orbit_rate": quantity(self.orbit_rate, "rad/s"),
-            "contact_force": quantity(self.contact_force, "N"),
-            "followed_time": quantity(self.time, "s"),
-            "approach_time": quantity(self.approach_time, "s"),
-        }
+        return content_of(self, over="a circuit" if self.state == "goes around" else "a turn of the tail")
 
 
 Motion = Literal["held", "free"]  #: Lateral motion and tilt constrained, or released.

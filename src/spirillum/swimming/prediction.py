@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
@@ -164,7 +165,7 @@ class Prediction(DisplayMixin):
             "placement": self.placement,
             **({"lying": self.lying.to_dict()} if self.lying else {}),
             **({"band": band.to_dict()} if band else {}),
-            **({"other_models": beside.to_dict()} if beside else {}),
+            **({"other_models": content_of(beside)} if beside else {}),
             **({name: getattr(self, name).to_dict() for name in self.released} if others else {}),
             "error_estimate": quantity(
                 self.error_estimate,

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from spirillum.envelope import quantity
 from spirillum.fitted.fit import Fit
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
@@ -244,19 +242,6 @@ class OtherModels:
     answers: tuple[OtherModel, ...]
     """One for each model, and one more for each that has calibration factors of this geometry."""
     statement: str  #: All in one line, and why they differ.
-
-    def to_dict(self) -> dict[str, Any]:
-        """As it stands in JSON."""
-        answers = [
-            {
-                "model": item.model,
-                "calibrated": item.calibrated,
-                "forward_velocity": quantity(item.forward_velocity, "m/s"),
-                "ratio": quantity(item.ratio, "1"),
-            }
-            for item in self.answers
-        ]
-        return {"statement": self.statement, "answers": answers}
 
 
 def other_models(

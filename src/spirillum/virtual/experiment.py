@@ -16,8 +16,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator
 
+from spirillum.answer_entries import answer_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import (
     MARK,
@@ -106,21 +106,12 @@ class VirtualExperiment(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The experiment's facts, as ``virtual-experiment --json`` prints them."""
-        robots = []
+        filmed = []
         for name in self.robots:
             known = zip(("model", "model_reason"), self.models.get(name, ("", "")), strict=True)
             answered = {key: text for key, text in known if text}  # without a reason where the model was named
-            robots.append({"robot": name, **answered, **in_units(self.rates[name])})
-        content = {
-            "synthetic": True,
-            "folder": str(self.folder),
-            "robots": robots,
-            "trials": self.trials,
-            "kept": self.kept,
-            "spread": self.spread,
-            "observations": str(self.observations),
-        }
-        return envelope("virtual-experiment", content, self.warnings)
+            filmed.append({"robot": name, **answered, **in_units(self.rates[name])})
+        return answer_of(self, filmed=filmed)
 
 
 def virtual_experiment(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.display import DisplayMixin, percent
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import quantity
 from spirillum.errors import InputError
 from spirillum.files import (
     MARK,
@@ -30,7 +30,6 @@ from spirillum.files import (
 from spirillum.formats.h264 import H264Writer, h264_writer
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
-from spirillum.quantities import in_units
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
@@ -143,28 +142,6 @@ class VirtualTrial(DisplayMixin):
     model_reason: str = ""  #: Why the model was taken; empty where it was named.
     motion: str = HELD  #: `held`, `trial`, `run`, or `prescribed`.
     assumption: str = ""  #: What the motion rests on, of a robot released in its tube.
-
-    def to_dict(self) -> dict[str, Any]:
-        """The trial's facts, as ``render --json`` prints them."""
-        content = {
-            "robot": self.robot.name,
-            "synthetic": True,
-            "model": self.model,
-            "motion": self.motion,
-            **({"model_reason": self.model_reason} if self.model_reason else {}),
-            "video": str(self.path),
-            "setup": str(self.setup),
-            "truth": str(self.truth),
-            **in_units(self.rates),
-            "frames": self.frames,
-            "dropped": self.dropped,
-            "width": self.size[0],
-            "height": self.size[1],
-            "frames_per_second": self.fps,
-            "seed": self.seed,
-            **({"assumption": self.assumption} if self.assumption else {}),
-        }
-        return envelope("virtual-trial", content, self.warnings)
 
 
 def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:

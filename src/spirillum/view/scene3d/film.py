@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin, percent
 from spirillum.dynamics.run_file import Poses, RobotPose, open_run, poses_of, robot_of
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
@@ -113,22 +113,8 @@ class Film(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """Content of ``film --json``."""
-        content = {
-            "robot": self.robot.name,
-            "model": self.model,
-            "file": str(self.path),
-            "frames": self.frames,
-            "width": self.size[0],
-            "height": self.size[1],
-            "frames_per_second": self.fps,
-            "speed": self.speed,
-            "camera": "follow" if self.follows else "fixed",
-            "duration": quantity(self.duration, "s"),
-            "tail_turn_per_frame": quantity(2.0 * np.pi * self.turn_per_frame, "rad"),
-            "travelled": quantity(self.travelled, "m"),
-            **({"assumption": self.assumption} if self.assumption else {}),
-        }
-        return envelope("film", content, self.warnings)
+        camera = "follow" if self.follows else "fixed"
+        return answer_of(self, camera=camera, tail_turn_per_frame=2.0 * np.pi * self.turn_per_frame)
 
 
 def film(

@@ -13,9 +13,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.run_file import RobotPose
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, clipped
 from spirillum.files import MARK, atomic_write, output_target
+from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
@@ -43,18 +43,10 @@ class Picture3D(DisplayMixin):
     pose: RobotPose  #: Pose of the robot: its body's mid-length, attitude, and the angle of its tail.
     path: Path | None  #: The file that was written.
 
-    def to_dict(self) -> dict[str, Any]:
-        """The picture's facts, as ``show --json`` prints them."""
-        height, width = self.pixels.shape[:2]
-        content = {
-            "robot": self.robot.name,
-            "file": None if self.path is None else str(self.path),
-            "view": self.view,
-            "phase": quantity(self.phase, "rad"),
-            "width": width,
-            "height": height,
-        }
-        return envelope("show", content, self.robot.warnings)
+    @property
+    def warnings(self) -> tuple[Note, ...]:
+        """Cautions of the robot."""
+        return self.robot.warnings
 
 
 def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
