@@ -146,13 +146,14 @@ def test_plot_draws_by_the_kind_of_answer(tmp_path) -> None:
 
 def test_entries_of_answers_are_declared_of_what_their_classes_have() -> None:
     source = Path(sp.__file__).parent
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in source.rglob("*.py")]
-    classes = {node.name: node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)}
+    nodes = [n for path in source.rglob("*.py") for n in ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+    classes = {node.name: node for node in nodes if isinstance(node, ast.ClassDef)}
+    calls = [n for n in nodes if isinstance(n, ast.Call) and ast.unparse(n.func) in ("answer_of", "content_of")]
+    computed = {str(word.arg) for call in calls for word in call.keywords}
     for name, rows in ENTRIES.items():
-        own = classes[name]
-        known = {node.name for node in own.body if isinstance(node, ast.FunctionDef)}
-        known |= {ast.unparse(node.target) for node in own.body if isinstance(node, ast.AnnAssign)}
-        known |= {str(word.arg) for node in ast.walk(own) if isinstance(node, ast.Call) for word in node.keywords}
+        own = classes[name].body
+        known = computed | {node.name for node in own if isinstance(node, ast.FunctionDef)}
+        known |= {ast.unparse(node.target) for node in own if isinstance(node, ast.AnnAssign)}
         named = [row.attribute or row.entry for row in rows] + [row.given for row in rows if row.given]
         named += [row.unit.strip("{}") for row in rows if row.unit.startswith("{")]
         assert {path.partition(".")[0] for path in named if not path.startswith("=")} - known == set(), name

@@ -3,7 +3,7 @@
 The row of `schema` names the answer's kind. `entry` is the place in the JSON (`latency.median`); without it the
 entries of a mapping stand beside the others. `attribute` is where the value is found (`size.0`, a method without
 arguments), or text after `=`; without it, it is called as the entry. `unit` is SI, `*` that of the registry, or that of
-an attribute in braces. An entry with `if` is left out where that attribute is None, NaN, zero or empty.
+an attribute in braces. An entry with `if` is left out where that attribute is None, NaN, false or empty.
 """
 
 from __future__ import annotations
@@ -97,5 +97,5 @@ def _plain(value: Any) -> Any:
 
 def _is_given(value: Any) -> bool:
     if isinstance(value, float):
-        return math.isfinite(value) and value != 0.0
+        return math.isfinite(value)
     return bool(value) if isinstance(value, (str, int, tuple, Mapping)) else value is not None

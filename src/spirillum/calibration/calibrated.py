@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity
 from spirillum.calibration.identifiability import Identifiability
@@ -20,7 +21,7 @@ from spirillum.calibration.parameters import ASSUMABLE, Estimate
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
 from spirillum.calibration.problem import Problem
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, interval, quantity
+from spirillum.envelope import interval, quantity
 from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
 from spirillum.notes import Note, note_attributes
 from spirillum.robot.robot import Robot
@@ -93,59 +94,23 @@ class Calibrated(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum calibrate --json`."""
-        written = {} if self.folder is None else {"folder": str(self.folder), "files": list(self.files)}
-        return envelope("calibration", _content(self) | written, self.warnings)
-
-
-def _content(found: Calibrated) -> dict[str, Any]:
-    """What was fitted, quantity by quantity."""
-    problem, experiment = found.problem, found.experiment
-    parameters = {
-        item.label: found.values[item.label].quantity(
-            item.parameter.unit,
-            meaning=item.parameter.meaning,
-            prior=item.prior.words(item.parameter.unit) if found.method == "posterior" else None,
+        parameters = {
+            item.label: self.values[item.label].quantity(
+                item.parameter.unit,
+                meaning=item.parameter.meaning,
+                prior=item.prior.words(item.parameter.unit) if self.method == "posterior" else None,
+            )
+            for item in self.problem.coordinates
+        }
+        return answer_of(
+            self,
+            rows=sum(len(rows) for rows in self.experiment.rows),
+            parameters=parameters,
+            misses={name: size.quantity("1") for name, size in self.discrepancy.items()},
+            tails=[_tail(self, place) for place in range(self.experiment.size)],
+            largest=LARGEST_RHAT,
+            fewest=FEWEST_EFFECTIVE,
         )
-        for item in problem.coordinates
-    }
-    content: dict[str, Any] = {
-        "observations": experiment.source,
-        "synthetic": experiment.synthetic,
-        "robots": experiment.size,
-        "rows": sum(len(rows) for rows in experiment.rows),
-        "model": problem.model.name,
-        **({"model_reason": found.model_reason} if found.model_reason else {}),
-        "method": found.method,
-        "friction": found.reading,
-        "parameters": parameters,
-        **({"effective_friction_statement": found.friction_statement} if found.friction_statement else {}),
-        "effective_friction_exact": {field: quantity(by, "1") for field, by in found.friction_exact.items()},
-        "discrepancy": {name: size.quantity("1") for name, size in found.discrepancy.items()},
-        "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
-        "tails": [_tail(found, place) for place in range(experiment.size)],
-    }
-    if found.least_squares is not None:
-        fit = found.least_squares
-        content["chi_squared"] = quantity(fit.chi2, "1", freedom=fit.freedom)
-    if found.identifiability is not None:
-        report = found.identifiability
-        content["identifiability"] = {
-            "labels": list(report.labels),
-            "singular_values": quantity(report.singular, "1"),
-            "directions": quantity(report.directions, "1"),
-            "sensitivities": quantity(report.sensitivity, "1"),
-        }
-    if found.posterior is not None:
-        posterior = found.posterior
-        content["sampler"] = {
-            "converged": posterior.converged,
-            "draws": int(posterior.flat.shape[0]),
-            "r_hat": posterior.rhat,
-            "largest_r_hat": LARGEST_RHAT,
-            "effective_draws": posterior.effective,
-            "fewest_effective_draws": FEWEST_EFFECTIVE,
-        }
-    return content
 
 
 def _tail(found: Calibrated, place: int) -> dict[str, Any]:

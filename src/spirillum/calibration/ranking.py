@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of, content_of
 from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
@@ -24,7 +25,7 @@ from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, free_name
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.problem import UnexplainedError
 from spirillum.display import DisplayMixin, counted
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import quantity
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
@@ -133,37 +134,22 @@ class Ranking(DisplayMixin):
             ]
         return sorted(found, key=lambda row: -abs(row["standard_deviations"]["value"]))[:_WORST]
 
-    def _known(self, standard_error: float) -> float | None:
-        """A standard error over the robots; None where there are too few of them."""
-        return standard_error if self.enough else None
-
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum rank-models --json`."""
-        experiment = self.best.fit.experiment
         models = [
-            {
-                "model": item.model,
-                "expected_log_density": quantity(item.elpd, "1", standard_error=self._known(item.standard_error)),
-                "difference": quantity(item.difference, "1", standard_error=self._known(item.difference_error)),
-                "largest_pareto_k": quantity(float(item.pareto.max()), "1"),
-                "discrepancy": {name: quantity(v.value, "1") for name, v in item.fit.discrepancy.items()},
-                "parameters": {
+            content_of(
+                item,
+                own_error=item.standard_error if self.enough else None,
+                apart_error=item.difference_error if self.enough else None,
+                discrepancy={name: v.value for name, v in item.fit.discrepancy.items()},
+                parameters={
                     c.label: item.fit.values[c.label].quantity(c.parameter.unit) for c in item.fit.problem.coordinates
                 },
-                "fails_most_at": self.failures(item),
-            }
+                failures=self.failures(item),
+            )
             for item in self.ranked
         ]
-        content = {
-            "observations": experiment.source,
-            "synthetic": experiment.synthetic,
-            "robots": experiment.size,
-            "models": models,
-            **({"model_reason": self.model_reason} if self.model_reason else {}),
-            "verdict": self.verdict(),
-            "clear": self.clear,
-        }
-        return envelope("model-ranking", content, self.warnings)
+        return answer_of(self, models=models)
 
 
 def rank_models(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.controllers.course_tasks import HoldSpeedTask, RideOutTask, SaveBatteryTask
 from spirillum.controllers.estimators import Bank
 from spirillum.controllers.lab import Lab
@@ -37,7 +38,7 @@ from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.release import reach_of
 from spirillum.dynamics.run_summary import vertical_drift
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import quantity
 from spirillum.errors import InputError, check_choice, check_memory, check_names, check_range
 from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
@@ -150,45 +151,19 @@ class Control(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer as data; with `settings`, `task`, `lab` and `seed` the run can be done again."""
-        run, pulse = self.run, self.drawn.pulse
-        last = run.moments[-1]
-        content: dict[str, Any] = {
-            "robot": self.robot.name,
-            "model": self.model,
-            **({"model_reason": self.model_reason} if self.model_reason else {}),
-            "task": {"kind": self.task.kind, **_fields(self.task)},
-            "start": _START,
-            "controller": self.controller,
-            "seed": self.seed,
-            "good": self.score.good,
-            "error": quantity(self.score.error, self.task.error_unit, meaning=self.task.error_name),
-            "duration": quantity(last.time, "s"),
-            "final_position_x": quantity(float(last.pose.position[0]), "m"),
-            "electrical_energy": quantity(self.score.energy, "J"),
-            "time_on": quantity(run.time_on, "s"),
-            "ended": run.ended or None,
-            "motor_off_at_end": last.values["duty"] == 0.0,
-            "late": quantity(self.late, "s") if self.late is not None else None,
-            "frames": {"taken": len(run.frames), "lost": sum(sight is None for _, sight in run.frames)},
-            "commands": {"sent": len(run.decisions), "lost": run.lost},
-            "drawn": {
-                "friction_factor": self.drawn.friction,
-                "gap_factor": self.drawn.gap,
-                "voltage_factor": self.drawn.voltage,
-                "viscosity_factor": self.drawn.viscosity,
-                "pulse": None
-                if pulse is None
-                else {
-                    "start": quantity(pulse.start, "s"),
-                    "end": quantity(pulse.end, "s"),
-                    "velocity": quantity(pulse.velocity, "m/s"),
-                },
-            },
-            "learnt": None if self.learnt is None else self.learnt.to_dict(),
-            "lab": {name: _fields(getattr(self.lab, name)) for name in Lab.model_fields},
-            "scores": None if self.scores is None else self.scores.to_dict(),
-        }
-        return envelope("control", content, self.warnings)
+        run = self.run
+        return answer_of(
+            self,
+            goal={"kind": self.task.kind, **_fields(self.task)},
+            start=_START,
+            ended=run.ended or None,
+            off=run.moments[-1].values["duty"] == 0.0,
+            late_by=quantity(self.late, "s") if self.late is not None else None,
+            taken=len(run.frames),
+            unseen=sum(sight is None for _, sight in run.frames),
+            sent=len(run.decisions),
+            settings={name: _fields(getattr(self.lab, name)) for name in Lab.model_fields},
+        )
 
     def _display_content(self) -> tuple[dict[str, Any], None]:
         """See `DisplayMixin`: the task's error first, then every controller's scores."""

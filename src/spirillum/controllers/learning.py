@@ -65,10 +65,6 @@ class RobotEstimate:
     friction: Factor
     gap: Factor
 
-    def to_dict(self) -> dict[str, Any]:
-        """The factors as data."""
-        return {"friction_factor": self.friction.to_dict(), "gap_factor": self.gap.to_dict()}
-
 
 @dataclass(frozen=True)
 class _Block:

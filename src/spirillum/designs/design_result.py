@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.designs.search import ConfirmedDesign
 from spirillum.display import DisplayMixin, percent
-from spirillum.envelope import envelope, interval, quantity
+from spirillum.envelope import interval, quantity
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.limits import broken
@@ -136,22 +137,17 @@ class Design(DisplayMixin):
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum design --json`."""
         named = {item.name: item for item in STEADY}
-        first = self.objectives[0]
-        unit = first.unit
-        content: dict[str, Any] = {
-            "robot": self.today.name,
-            "model": self.model,
-            "calibrated": self.calibrated,
-            **({"model_reason": self.model_reason} if self.model_reason else {}),
-            "objective": {"words": first.words, **quantity(self.objective, unit)},
-            "conditions": list(self.conditions),
-            "design": self._fields(self.values),
-            "winding": {name: quantity(value, "1" if name == "turns" else "m") for name, value in self.winding.items()},
-            "bound_by": list(self.bound_by),
-            "quantities": {
+        unit, known, units = self.objectives[0].unit, self.uncertainty, dict(self.units)
+        units |= {item.name: item.unit for item in self.objectives}
+        probability = None if known is None else known.probability
+        return answer_of(
+            self,
+            best=self._fields(self.values),
+            to_wind={name: quantity(value, "1" if name == "turns" else "m") for name, value in self.winding.items()},
+            gives={
                 name: quantity(value, named[name].unit, **self._ends(name)) for name, value in self.quantities.items()
             },
-            "alternatives": [
+            compared=[
                 {
                     "name": other.name,
                     "design": self._fields(other.values),
@@ -163,7 +159,7 @@ class Design(DisplayMixin):
                 }
                 for other in self.alternatives
             ],
-            "sensitivity": {
+            sensitivity={
                 profile.path: {
                     "within_one_per_cent": quantity([profile.low, profile.high], profile.unit),
                     "binds": profile.binds,
@@ -172,34 +168,17 @@ class Design(DisplayMixin):
                 }
                 for profile in self.profiles
             },
-            "designs": {"swum": self.swum, "refused": self.refused, "breaking_a_condition": self.breaking},
-        }
-        if self.confirmed:
-            content["confirmed"] = [
+            trials=[
                 {
                     "design": self._fields(self.searched.space.named(one.shares)),
                     "held": {"forward_velocity": quantity(one.held, "m/s")},
-                    "trial": one.trial.to_dict(),
+                    "trial": one.trial,
                 }
                 for one in self.confirmed
-            ]
-        if self.uncertainty is not None:
-            known = self.uncertainty
-            content["uncertainty"] = {"draws": known.draws, "deciding": dict(known.deciding)}
-            if known.probability is not None:
-                share, low, high = known.probability
-                content["uncertainty"]["probability"] = quantity(share, "1", **interval(low, high, LEVEL))
-        if self.learned is not None:
-            content["learned"] = {
-                "solves": self.learned.solves,
-                "error_of_the_best": quantity(self.learned.last, "1"),
-                "error_left_out": quantity(self.learned.left_out, "1"),
-                "error_stated": quantity(self.learned.stated, "1"),
-            }
-        if self.front is not None:
-            units = dict(self.units) | {item.name: item.unit for item in self.objectives}
-            content["front"] = {name: quantity(column, units[name]) for name, column in self.front.items()}
-        return envelope("design", content, self.warnings)
+            ],
+            met=None if probability is None else quantity(probability[0], "1", **interval(*probability[1:], LEVEL)),
+            both={name: quantity(column, units[name]) for name, column in (self.front or {}).items()},
+        )
 
     def _fields(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Values of the fields that are varied, with their units."""

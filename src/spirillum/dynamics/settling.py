@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.release import InTube
 from spirillum.dynamics.run_summary import state_of
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import read_fit
 from spirillum.fluid.tube.library import find_table
@@ -32,7 +32,6 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import core
 from spirillum.notes import Note
 from spirillum.progress import Progress
-from spirillum.quantities import in_units
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -163,37 +162,23 @@ class Settling(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum settle --json`."""
-        motion, count = self.prediction, self.way("time").size
+        count = self.way("time").size
         shown = np.unique(np.linspace(0, count - 1, min(_SAMPLES, count)).astype(int))
-        moving = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
         names = {name: name for name in ("time", "gap", "azimuth")} | {"wall_pitch": "pitch", "wall_yaw": "yaw"}
         names |= {"contact_force": "contact_force"}
-        films = {name: [getattr(film, name) for film in self.films] for name in LubricationFilm._fields}
-        content = {
-            "robot": self.robot.name,
-            "model": motion.model.name,
-            "model_reason": IN_CHANNEL,
-            **in_units({name: getattr(motion, name) for name in moving}),
-            "submerged_weight": quantity(self.weight, "N", uncertainty=self.weight_uncertainty),
-            **in_units({"roughness": self.roughness, "friction_coefficient": self.friction_coefficient}),
-            "state": state_of(self.lying, self.warnings),
-            "lying": self.lying.to_dict(),
-            "drainage_time": quantity(self.drainage_time, "s", until=quantity(self.until, "m")),
-            "passing": in_units(self.passing),
-            "way": in_units({name: self.way(way)[shown] for name, way in names.items()}),
-            "film": in_units(
-                {
-                    "gap": films["gap"],
-                    "normal_resistance": films["normal_resistance"],
-                    "over_lubrication": self.lubrication_ratios,
-                    "sideways_force": films["sideways_force"],
-                }
-            ),
-            "placement": motion.placement,
-            "error_estimate": motion.to_dict()["error_estimate"],
-            "references": list(motion.references),
+        film: dict[str, Any] = {
+            name: [getattr(film, name) for film in self.films] for name in ("gap", "normal_resistance")
         }
-        return envelope("settling", content, self.warnings)
+        film["over_lubrication"] = self.lubrication_ratios
+        film["sideways_force"] = [film.sideways_force for film in self.films]
+        return answer_of(
+            self,
+            model_reason=IN_CHANNEL,
+            state=state_of(self.lying, self.warnings),
+            trajectory={name: self.way(way)[shown] for name, way in names.items()},
+            film=film,
+            error_estimate=self.prediction.to_dict()["error_estimate"],
+        )
 
 
 def settle(

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.arrays import Samples
 from spirillum.data_tables import rows_of
 from spirillum.dynamics.release import InTube, Release
@@ -137,11 +138,6 @@ class TrialUnknown(NamedTuple):
             return self.low + (self.high - self.low) * shares
         return self.low * (self.high / self.low) ** shares
 
-    def to_dict(self, share: float) -> dict[str, Any]:
-        """Its entry in `unknowns` of an answer, with its share of the variance."""
-        ends = {"low": self.low, "high": self.high, "of": self.of, "source": self.source}
-        return {"name": self.name, "distribution": self.kind, **ends, "share": quantity(share, "1")}
-
 
 UNKNOWNS = tuple(
     TrialUnknown(**{**row, "low": float(row["low"]), "high": float(row["high"])})
@@ -241,7 +237,7 @@ def with_interval(
     moving = [one for one, there in zip(runs, swims, strict=True) if there]
     speeds = np.log([one.values["forward_velocity"] for one in moving])
     shares = variance_shares(_shares(unknowns)[swims], speeds)
-    basis["unknowns"] = [one.to_dict(share) for one, share in zip(unknowns, shares, strict=True)]
+    basis["unknowns"] = [content_of(one, share=share) for one, share in zip(unknowns, shares, strict=True)]
     edge = 0.5 * (1.0 - LEVEL)
     values = {name: np.array([one.values[name] for one in moving]) for name in nominal.values}
     if discrepancy is not None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import quantity, with_notes_last
@@ -84,6 +85,10 @@ class Flow(DisplayMixin):
         if self.robot.channel is None or self.seat is not None:
             return self.prediction.warnings
         return (*self.prediction.warnings, Note.named("flow-without-walls"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The motion and its settings, as data."""
+        return answer_of(self, is_lifted=self.lifted != 0.0)
 
     def with_held_force(self) -> Flow:
         """This flow with the sideways force that the fluid's traction amounts to."""

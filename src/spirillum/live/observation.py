@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, finite, quantity
 from spirillum.measurement.setup_template import scale_confirmed, setup_remarks
 from spirillum.measurement.trials import RATE_NAMES, Measured, Trial
 from spirillum.notes import Note
@@ -50,21 +50,14 @@ class Observation(DisplayMixin):
         """Whether the robot was seen on this frame."""
         return self.state == "tracking"
 
+    @property
+    def warnings(self) -> tuple[Note, ...]:
+        """What to be careful about."""
+        return tuple(flag.note for flag in self.flags)
+
     def to_dict(self) -> dict[str, Any]:
         """The observation as data, SI with rates in rad/s."""
-        content: dict[str, Any] = {"frame": self.frame, "time": quantity(self.time, "s"), "state": self.state}
-        if self.reason:
-            content["reason"] = self.reason
-        if self.state != "learning":
-            content |= {
-                "position": quantity([self.x, self.y], "m", standard_error=finite(self.position_error)),
-                "heading": quantity(self.heading, "rad", standard_error=finite(self.heading_error)),
-                "body_angle": quantity(self.body_angle, "rad", standard_error=finite(self.body_angle_error)),
-                "tail_phase": quantity(self.tail_phase, "rad", standard_error=finite(self.tail_phase_error)),
-                "pixel": quantity(list(self.pixel), "px"),
-            }
-            content |= {name: item.to_dict() for name, item in self.rates.items()}
-        return envelope("live-observation", content, [flag.note for flag in self.flags])
+        return answer_of(self, place=[self.x, self.y], learnt=self.state != "learning")
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,15 +98,5 @@ class Tracked(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer as data, SI with rates in rad/s."""
-        content: dict[str, Any] = {
-            "source": self.source,
-            "pace": self.pace,
-            "frames": self.frames,
-            "frames_tracked": self.tracked,
-            "frames_dropped": self.dropped,
-            "learnt_at": quantity(self.learnt, "s"),
-            "latency": {"median": quantity(self.latency(0.5), "s"), "percentile_95": quantity(self.latency(0.95), "s")},
-        }
-        if self.trial is not None:
-            content |= {name: self.trial.quantities[name].to_dict() for name in RATE_NAMES}
-        return envelope("track", content, self.warnings)
+        rates = {} if self.trial is None else {name: self.trial.quantities[name] for name in RATE_NAMES}
+        return answer_of(self, median=self.latency(0.5), percentile_95=self.latency(0.95), rates=rates)

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import checked_path, file_name
 from spirillum.measurement.flags import BY_HAND
@@ -180,16 +180,9 @@ class Measurement(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON, SI with rates in rad/s."""
-        content = {
-            "robot": self.robot.name,
-            "setup": self.setup,
-            "trials": [{"name": trial.name, **trial.to_dict()} for trial in self.trials],
-            "summary": self.summary.to_dict(),
-            "lateral_shift_of_a_degree": quantity(self.lateral_shift, "m"),
-            "failures": [{"video": video, "sentence": sentence} for video, sentence in self.failures],
-            "files": list(self.files),
-        }
-        return envelope("measurement", content, self.warnings)
+        measured = [{"name": trial.name, **trial.to_dict()} for trial in self.trials]
+        failed = [{"video": video, "sentence": sentence} for video, sentence in self.failures]
+        return answer_of(self, measured=measured, failed=failed)
 
 
 _UNLIKE = 1.25  # ratio from which on trials of one robot are no repeats: those of one drive scatter by some per cent

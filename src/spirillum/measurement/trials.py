@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.arrays import Samples
 from spirillum.envelope import quantity
 from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, elongation_of, flags_of
@@ -106,29 +107,9 @@ class Trial:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        scale = self.track.scale
-        return {
-            "video": self.video,
-            "frames": int(self.track.time.size),
-            "frames_measured": int(np.isfinite(self.track.position[:, 0]).sum()),
-            "duration": quantity(float(np.ptp(self.track.time)) if self.track.time.size else 0.0, "s"),
-            **{name: item.to_dict() for name, item in self.quantities.items()},
-            "scale": {
-                "length_per_pixel": quantity(scale.length_per_pixel, "m"),
-                "relative_uncertainty": scale.relative_uncertainty,
-                "sources": dict(scale.sources),
-                "markers": scale.markers,
-                "apparent_body_size": scale.apparent_size if math.isfinite(scale.apparent_size) else None,
-            },
-            "cues": {
-                name: {
-                    "share_of_frames": cue.share,
-                    "disagreement": cue.disagreement if math.isfinite(cue.disagreement) else None,
-                }
-                for name, cue in self.track.cues.items()
-            },
-            "flags": [{"name": f.name, "sentence": f.sentence, "spoils": list(f.spoils)} for f in self.flags],
-        }
+        time, position = self.track.time, self.track.position
+        duration = float(np.ptp(time)) if time.size else 0.0
+        return content_of(self, measured=int(np.isfinite(position[:, 0]).sum()), duration=duration)
 
 
 def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None = None) -> Trial:

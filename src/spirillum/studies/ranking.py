@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.arrays import Values
 from spirillum.display import counted, percent
 from spirillum.envelope import quantity
@@ -125,15 +126,7 @@ class Best(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        found: dict[str, Any] = {"what": self.what, "quantity": self.quantity, "robot": self.robot.name}
-        found |= {"alike": self.alike, "spread": quantity(self.spread, "1")}
-        found |= {"robots": self.known, "of_robots": self.robots}
-        found |= {"ties": list(self.ties)} if self.ties else {}
-        if np.isfinite(self.lead):
-            found |= {"lead": quantity(self.lead, "1")}
-        if np.isfinite(self.lead) and np.isfinite(self.error):
-            found |= {"model_error": quantity(self.error, "1"), "within_error": list(self.within)}
-        return found | ({"places": self.places, "of_places": self.of_places} if self.of_places else {})
+        return content_of(self)
 
 
 @dataclass(frozen=True)
@@ -182,16 +175,8 @@ class StudyRanking:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON; at most a thousand robots."""
-        return {
-            "model": self.model,
-            "friction": self.friction,
-            "walls_left_out": self.walls,
-            "held": self.held,
-            "low_and_high": self.kind or "none",
-            **({"settled": self.basis} if self.lead == STEADY_SPEED else {}),
-            "best": [best.to_dict() for best in self.best],
-            "robots": [robot.to_dict() for robot in self.robots[:_MOST]],
-        }
+        basis = self.basis if self.lead == STEADY_SPEED else ""
+        return content_of(self, ends=self.kind or "none", basis=basis, first=self.robots[:_MOST])
 
 
 _AT_A_POSE = " at a fixed pose"
