@@ -10,9 +10,10 @@ import ast
 import inspect
 import math
 import os
+import re
 import sys
 import types
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Set
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
@@ -122,6 +123,20 @@ def as_step(dt: Any, longest: float) -> float:
     if not 0.0 < number <= longest:
         raise InputError(f"dt = {clipped(dt)}; allowed: above 0, at most {longest:g} s")
     return number
+
+
+def as_pixels(size: Any, low: int = 1, high: int = 99_999, *, even: bool = False) -> tuple[int, int]:
+    """Width and height in pixels from ``1600x900`` or a pair."""
+    which = "even numbers from " if even else ""
+    allowed = f"WIDTHxHEIGHT in pixels, {which}{low} to {high} each, for example 1600x900"
+    listed = isinstance(size, Collection) and not isinstance(size, (str, Set, Mapping))
+    words = [str(part).strip() for part in (size if listed else re.split("[xX×]", str(size)))]
+    if len(words) != 2 or not all(word.isdecimal() and len(word) <= 6 for word in words):
+        raise InputError(f"size = {clipped(size)}; allowed: {allowed}")
+    width, height = map(int, words)
+    if not all(low <= length <= high and (length % 2 == 0 or not even) for length in (width, height)):
+        raise InputError(f"size = {width}x{height}; allowed: {allowed}")
+    return width, height
 
 
 def number_array(name: str, value: Any, allowed: str = "numbers") -> Samples:

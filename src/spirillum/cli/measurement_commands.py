@@ -96,6 +96,7 @@ def track(
 
     Example: `spirillum track camera:0 --setup setup.toml --size 640x480 --fps 30`
     """
+    from spirillum.argument_validation import as_pixels
     from spirillum.live.session import observation_line
     from spirillum.live.streams import line_of
 
@@ -107,7 +108,7 @@ def track(
 
     typed = request.typed
     if "size" in typed:
-        typed["size"] = _size(typed["size"])
+        typed["size"] = as_pixels(typed["size"])
     lines = "udp" not in typed
     result = request(source, setup, overrides=overrides_from(settings), on_observation=say if lines else None)
     if lines:
@@ -131,13 +132,6 @@ def _end(result: Tracked, source: str) -> None:
             slow = result.pace == "real" and Path(source).exists() and result.dropped > result.tracked
             hint = "; most frames passed while the robot was learnt: --pace fast looks at all of them" if slow else ""
             raise InputError(f"{result.source}: no rate could be given: {rates[0].reason}{hint}")
-
-
-def _size(word: str) -> tuple[int, int]:
-    parts = word.lower().split("x")
-    if len(parts) != 2 or not all(part.isascii() and part.isdigit() and 1 <= len(part) <= 5 for part in parts):
-        raise InputError(f"size = {word[:40]!r}; allowed: WIDTHxHEIGHT in pixels, for example 640x480")
-    return int(parts[0]), int(parts[1])
 
 
 @from_function(

@@ -8,6 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
+from spirillum.argument_validation import as_pixels
+from spirillum.errors import InputError
 from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
 from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity, refuse
 
@@ -18,16 +20,10 @@ and a focal length of 740 pixels for a width of 640; assumed."""
 
 def _read_size(value: Any) -> tuple[int, int]:
     """Width and height from ``640x480`` or a pair."""
-    low, high = 64, 4096
-    allowed = f"WIDTHxHEIGHT in pixels, even numbers from {low} to {high}, for example 640x480"
-    pair = isinstance(value, tuple | list)
-    parts = [str(item) for item in value] if pair else str(value).lower().replace("×", "x").split("x")
-    if len(parts) != 2 or not all(part.strip().isdecimal() and len(part) <= 6 for part in parts):
-        raise refusal(f"= {str(value)[:40]!r}; allowed: {allowed}")
-    width, height = (int(part) for part in parts)
-    if not all(low <= length <= high and length % 2 == 0 for length in (width, height)):
-        raise refusal(f"= {width}x{height}; allowed: {allowed}")
-    return width, height
+    try:
+        return as_pixels(value, 64, 4096, even=True)
+    except InputError as error:
+        raise refusal(str(error).removeprefix("size ")) from None
 
 
 def _check_heading(angle: float) -> float:

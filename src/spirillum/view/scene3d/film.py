@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.answer_entries import answer_of
+from spirillum.argument_validation import as_pixels
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin, percent
 from spirillum.dynamics.run_file import Poses, RobotPose, open_run, poses_of, robot_of
@@ -26,7 +27,7 @@ from spirillum.view.figures.style import COLOURS, with_micro
 from spirillum.view.figures.trajectory import mean_velocity_in_words, silhouette
 from spirillum.view.scene3d.rendering import FILMS, video_writer
 from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
-from spirillum.view.scene3d.show import checked_size, glass_around, scene_points
+from spirillum.view.scene3d.show import SIZES, glass_around, scene_points
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -149,7 +150,7 @@ def film(
     """
     target = output_target(path, FILMS, "run.mp4")
     check_choice("view", view, VIEWS)
-    pixels = _even(checked_size(size))
+    pixels = _even(as_pixels(size, *SIZES))
     _check_pace(fps, 1.0 if speed is None else speed, target.suffix.lower())
     check_choice("camera", camera, CAMERAS)
     if isinstance(dataset, (str, Path)):

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.argument_validation import as_pixels
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.run_file import RobotPose
-from spirillum.errors import InputError, check_choice, clipped
+from spirillum.errors import check_choice
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.robot.load import load
@@ -26,7 +26,7 @@ from spirillum.view.scene3d.scenery import VIEWS, SceneCamera, fitted
 if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
 
-SMALLEST, LARGEST = 64, 4096  #: Allowed widths and heights of a picture, pixels.
+SIZES = 64, 4096  #: Least and largest allowed widths and heights of a picture, pixels.
 _FINER = 2  # rendered pixels per pixel of a picture, along width and height (supersampling)
 _MOST_FINER = 5_000_000  # pixels of a picture above which supersampling is off: it would take gigabytes
 
@@ -47,24 +47,6 @@ class Picture3D(DisplayMixin):
     def warnings(self) -> tuple[Note, ...]:
         """Cautions of the robot."""
         return self.robot.warnings
-
-
-def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
-    """Width and height in pixels from ``1600x900`` or a pair."""
-    allowed = f"WIDTHxHEIGHT in pixels, {SMALLEST} to {LARGEST} each, for example 1600x900"
-    if isinstance(size, str):
-        found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", size.strip())
-        if found is None:
-            raise InputError(f"size = {size[:40]!r}; allowed: {allowed}")
-        width, height = int(found[1]), int(found[2])
-    else:
-        pair: Any = size  # any list of Python or NumPy
-        if isinstance(pair, Set) or len(pair) != 2:
-            raise InputError(f"size = {clipped(size)}; allowed: {allowed}")
-        width, height = (int(value) for value in pair)
-    if not all(SMALLEST <= value <= LARGEST for value in (width, height)):
-        raise InputError(f"size = {width}x{height}; allowed: {allowed}")
-    return width, height
 
 
 def show(
@@ -97,7 +79,7 @@ def show(
     target = None if path is None else output_target(path, {".png": "a picture"}, "robot.png")
     check_choice("view", view, VIEWS)
     turned = parse_option("phase", phase, KINDS["angle"])
-    pixels = checked_size(size)
+    pixels = as_pixels(size, *SIZES)
     loaded = load(robot)
     from PIL import Image
 
