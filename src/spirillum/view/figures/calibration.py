@@ -20,7 +20,17 @@ from spirillum.units import Hz
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, width_of
 from spirillum.view.figures.study_panels import spread
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, in_words, look_of_model, plain, styled
+from spirillum.view.figures.style import (
+    COLOURS,
+    PAGE,
+    PATCH,
+    WHITE_BOX,
+    UnitPrefix,
+    in_words,
+    look_of_model,
+    plain,
+    styled,
+)
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
@@ -415,7 +425,7 @@ def residual_figure(found: Calibrated) -> Figure:
                 transform=last.get_xaxis_transform(),
                 ha="center",
                 size=8,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+                bbox=WHITE_BOX,
             )
         return sheet.finished()
 

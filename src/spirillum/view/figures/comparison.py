@@ -26,6 +26,7 @@ from spirillum.view.figures.sheet import Picture, Sheet, write_beside
 from spirillum.view.figures.style import (
     COLOURS,
     PAGE,
+    WHITE_BOX,
     UnitPrefix,
     distinct_labels,
     look_of_model,
@@ -234,8 +235,7 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
 
 
 _WORDS: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#777777", "style": "italic"}
-_WHITE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
-_SHARE: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#333333", "bbox": _WHITE, "zorder": 6}
+_SHARE: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#333333", "bbox": WHITE_BOX, "zorder": 6}
 
 
 def _finish(axes: Axes, values: np.ndarray) -> None:
@@ -263,12 +263,12 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         )
     speeds = np.array([effect.speed for effect in effects])
     with styled():
-        sheet = Sheet(
+        sheet = _sheet_of_rows(
             f"{plain(comparison.robot.name, 60)}: why models differ",
-            f"friction model '{comparison.friction}' · computed, no measured data",
-            heights=[_EFFECT_HEIGHT * len(effects) + 0.1],
-            letters=False,
-            notes=[
+            f"friction model '{comparison.friction}'",
+            [effect.name if row == 0 else f"+ {effect.name}" for row, effect in enumerate(effects)],
+            _EFFECT_HEIGHT,
+            [
                 "Each line keeps the effects above it; factor: speed over that of the line above.",
                 _TRIAL if effects[-1].name == RELEASED_EFFECT else _why_no_trial(comparison),
             ],
@@ -276,13 +276,19 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         axes = sheet.panels[0, 0]
         scale = UnitPrefix.of(speeds, "m/s")
         _draw_waterfall(axes, speeds / scale.factor)
-        axes.set_yticks(
-            range(len(effects)),
-            [effect.name if row == 0 else f"+ {effect.name}" for row, effect in enumerate(effects)],
-        )
-        axes.set_ylim(len(effects) - 0.4, -0.6)
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
+
+
+def _sheet_of_rows(title: str, subtitle: str, rows: list[str], height: float, notes: list[str]) -> Sheet:
+    """A sheet of one panel, a named line for each row from the top."""
+    heights = [height * len(rows) + 0.1]
+    sheet = Sheet(title, f"{subtitle} · computed, no measured data", heights=heights, letters=False, notes=notes)
+    axes = sheet.panels[0, 0]
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
+    return sheet
 
 
 def _why_no_trial(comparison: ModelComparison) -> str:
@@ -318,7 +324,6 @@ def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:
             axes.plot([now, now], [row, row + 1], color="#999999", linewidth=0.6, zorder=1)
         factor = f"  × {now / was:.2f}" if row and was != 0.0 else ""
         write_beside(axes, f"{now:.3g}{factor}", (max(was, now), row), (6, 0), va="center", size=8, color="#333333")
-    axes.grid(visible=False, axis="y")
 
 
 _SPEED = "forward_velocity"
@@ -340,12 +345,12 @@ def prediction_figure(prediction: Prediction) -> Figure:
     rows, missing = list(_rows(prediction)), list(_missing(prediction))
     scale = UnitPrefix.of(np.array([(row.speed, row.low, row.high) for row in rows]), "m/s")
     with styled():
-        sheet = Sheet(
+        sheet = _sheet_of_rows(
             f"{plain(prediction.robot.name, 60)}: predicted speed",
-            f"model {prediction.model.name} · friction model '{prediction.friction}' · computed, no measured data",
-            heights=[_LINE_HEIGHT * len(rows) + 0.1],
-            letters=False,
-            notes=[*_bars(prediction), *missing],
+            f"model {prediction.model.name} · friction model '{prediction.friction}'",
+            [row.label for row in rows],
+            _LINE_HEIGHT,
+            [*_bars(prediction), *missing],
         )
         axes = sheet.panels[0, 0]
         for number, row in enumerate(rows):
@@ -358,9 +363,6 @@ def prediction_figure(prediction: Prediction) -> Figure:
         ends = np.array([(row.speed, row.low, row.high) for row in rows]) / scale.factor
         least, most = min(float(np.nanmin(ends)), 0.0), max(float(np.nanmax(ends)), 0.0)
         axes.set_xlim(_ROOM_FOR_NUMBER * least, most + (_ROOM_FOR_NUMBER - 1.0) * (most - least))
-        axes.set_yticks(range(len(rows)), [row.label for row in rows])
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.grid(visible=False, axis="y")
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
 

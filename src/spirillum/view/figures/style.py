@@ -38,6 +38,7 @@ COLUMN, PAGE = 3.35, 6.69  #: Width of a column and of a page of a journal, inch
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
 """Settings on the display of a session's own figures, which do not change ours."""
 PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}  #: Line that represents an area in a legend.
+WHITE_BOX: Any = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  #: Box behind text on lines.
 DPI = 200  #: Of PNG files.
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {"Software": MARK}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")

@@ -26,7 +26,7 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 from spirillum.units import show, show_height, speed_unit
 from spirillum.view.figures.sheet import Sheet, write_beside
-from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
+from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, WHITE_BOX, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -286,9 +286,8 @@ def _draw_gap_axis(axes: Axes, dataset: xr.Dataset, values: Samples, scale: Unit
     if roughness > 0:
         low = min(low, roughness)
         axes.axhline(roughness / scale.factor, color="#555555", linewidth=0.9, linestyle=(0, (1, 1.5)))
-        pale = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
-        look: dict[str, Any] = {"xycoords": axes.get_yaxis_transform(), "size": 7.5, "color": "#555555", "bbox": pale}
-        write_beside(axes, "roughness", (0.01, roughness / scale.factor), (0, 2), **look)
+        look: dict[str, Any] = {"xycoords": axes.get_yaxis_transform(), "size": 7.5, "color": "#555555"}
+        write_beside(axes, "roughness", (0.01, roughness / scale.factor), (0, 4), bbox=WHITE_BOX, **look)
     axes.set_yscale("log")
     axes.set_ylim(0.6 * low / scale.factor, max(1.6 * high, 10.0 * low) / scale.factor)
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if high > _DECADES_BARE * low else (1.0, 2.0, 5.0), numticks=7))
@@ -344,7 +343,7 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
         words = str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}"
         at = first + (left + 0.5 * _WIDE[len(numbers) > 1]) * span, 1.0
         look = {"xycoords": axes.get_xaxis_transform(), "ha": "center", "size": 7, "color": "#555555"}
-        write_beside(axes, words, at, (0, 2), **look)
+        write_beside(axes, words, at, (0, 2), bbox=WHITE_BOX, **look)
 
 
 def _left_end(positions: list[float]) -> float:
