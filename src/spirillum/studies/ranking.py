@@ -207,7 +207,7 @@ def _lead_in_words(best: Mapping[str, Any]) -> str:
     """By how much the best robot leads, beside the error of the model between the two."""
     lead = f"the next is {percent(best['lead']['value'])} behind"
     if "model_error" not in best:
-        return f"{lead} (no error is stated)"
+        return lead
     within, error = best["within_error"], percent(best["model_error"]["value"])
     if not within:
         return f"{lead}, the model's error is {error}"
