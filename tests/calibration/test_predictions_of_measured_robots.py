@@ -13,7 +13,7 @@ import spirillum as sp
 from spirillum.fitted.posterior_file import PosteriorFile, posterior_checksum
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
-from spirillum.swimming.sampled_resistance import sampled_discrepancy
+from spirillum.swimming.intervals import sampled_discrepancy
 from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"
@@ -59,7 +59,7 @@ def test_discrepancy_of_a_measured_robot_is_conditioned_on_its_mean() -> None:
     """Mean f tau^2 r/(tau^2 + s^2) and variance tau^2 s^2/(tau^2 + s^2) of a normal number seen with an error."""
     robot, posterior = known(400_000, 0.05, 0.04, {"advance": 1.1e-4})
     predicted = {"advance": np.full(400_000, 1.0e-4), "turning": np.full(400_000, -0.1)}
-    factor = sampled_discrepancy(posterior, predicted, np.random.default_rng(0), robot)["advance"]
+    factor = sampled_discrepancy(posterior, predicted, np.random.default_rng(0), posterior.measured(robot))["advance"]
     error = 0.04 * 1.1 / 2.0
     share = 0.05**2 / (0.05**2 + error**2)
     assert factor.mean() == pytest.approx(1.0 + 0.1 * share, abs=3e-4)
@@ -71,7 +71,7 @@ def test_correlated_errors_are_conditioned_together() -> None:
     observed = {"advance": 1.05e-4, "turning": -0.09}
     robot, posterior = known(400_000, 0.05, 0.1, observed, trials=4, correlation=0.8)
     predicted = {"advance": np.full(400_000, 1e-4), "turning": np.full(400_000, -0.1)}
-    found = sampled_discrepancy(posterior, predicted, np.random.default_rng(0), robot)
+    found = sampled_discrepancy(posterior, predicted, np.random.default_rng(0), posterior.measured(robot))
     values = np.array([1e-4, -0.1])
     seen = np.array([1.05e-4, -0.09])
     errors = 0.1 * np.abs(seen) / 2.0
@@ -89,7 +89,7 @@ def test_advance_over_the_motors_rate_is_compared_as_it_was_observed() -> None:
     observed = {"advance": 1.0e-4}
     robot, posterior = known(50_000, 0.05, 1e-4, observed, by_motor=True)
     predicted = {"advance": np.full(50_000, 1.2e-4), "turning": np.full(50_000, -0.2)}
-    factor = sampled_discrepancy(posterior, predicted, np.random.default_rng(0), robot)["advance"]
+    factor = sampled_discrepancy(posterior, predicted, np.random.default_rng(0), posterior.measured(robot))["advance"]
     assert factor.mean() == pytest.approx(1.0, abs=1e-3)  # 1.2e-4 over 1.2 is what was seen
 
 
@@ -101,7 +101,7 @@ def test_intervals_hold_the_truth_of_measured_robots() -> None:
         mean = truth + 0.03 * abs(truth) / 2.0 * rng.normal()
         robot, posterior = known(1000, 0.05, 0.03, {"advance": mean})
         predicted = {"advance": np.full(1000, 1e-4), "turning": np.full(1000, -0.1)}
-        drawn = 1e-4 * sampled_discrepancy(posterior, predicted, rng, robot)["advance"]
+        drawn = 1e-4 * sampled_discrepancy(posterior, predicted, rng, posterior.measured(robot))["advance"]
         low, high = np.quantile(drawn, [0.025, 0.975])
         held.append(low <= truth <= high)
     assert 0.92 < np.mean(held) < 0.98

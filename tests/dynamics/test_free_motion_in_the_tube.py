@@ -11,7 +11,6 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
-from spirillum.dynamics.integration import observed_at
 from spirillum.dynamics.return_map import STEPS, ReturnMap
 from spirillum.dynamics.settling import lubrication_resistance
 from spirillum.dynamics.tube_simulation import compare_with_check
@@ -69,7 +68,7 @@ def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> Non
     lying = motion.run.lying
     turns = ReturnMap(motion.robot, 1.0)
     state = motion.run.start.copy()
-    rest = float(observed_at(motion.robot, state)[core.SEEN_AZIMUTH])
+    rest = float(motion.robot.observe_state(state)[core.SEEN_AZIMUTH])
     cos, sin = np.cos(0.002), np.sin(0.002)
     state[1:3] = cos * state[1] - sin * state[2], sin * state[1] + cos * state[2]
     state[3:7] = _turned_about_x(state[3:7], 0.002)
@@ -77,7 +76,7 @@ def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> Non
     for _ in range(100):
         turn = turns.after(state)
         state, time = turn.state, time + turn.time
-        away.append((time, float(observed_at(motion.robot, state)[core.SEEN_AZIMUTH]) - rest))
+        away.append((time, float(motion.robot.observe_state(state)[core.SEEN_AZIMUTH]) - rest))
     late = np.array(away[75:])
     slope = np.polyfit(late[:, 0], np.log(np.abs(late[:, 1])), 1)[0]
     assert -1.0 / slope == pytest.approx(lying.approach_time, rel=0.02)

@@ -12,7 +12,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics import tube_simulation
-from spirillum.dynamics.integration import Reach, integrate, observed_at
+from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.release import InTube, Release, read_flow, released_state, state_at_release
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import run_answer
@@ -230,7 +230,7 @@ def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
         _, links, _ = made(around)
         state = state_at_release(made()[0].robot, links, *at(gap=5e-4))
         state[core.STATE_CURRENT] = 0.05
-        speeds.append(observed_at(links, state)[0])
+        speeds.append(links.observe_state(state)[0])
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-9)
     assert speeds[2] > speeds[0]
 
@@ -294,7 +294,7 @@ def test_rates_solve_the_balance(made: Any) -> None:
         for current in (0.0, 1e-3, 0.05):
             state = state_at_release(steady.robot, links, *at(gap=gap, pitch=0.002, yaw=0.01))
             state[core.STATE_CURRENT] = current
-            assert observed_at(links, state)[core.SEEN_BALANCE] < 1e-12
+            assert links.observe_state(state)[core.SEEN_BALANCE] < 1e-12
     rng = np.random.default_rng(3)
     for _ in range(300):
         half = rng.normal(size=(7, 7)) * 10.0 ** rng.uniform(-1, 1, 7)

@@ -35,7 +35,7 @@ from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robust import mad_scale
-from spirillum.swimming.sampled_resistance import error_of_mean
+from spirillum.swimming.intervals import error_of_mean
 
 Quantity = Literal["advance", "turning", "motor_rate"]  #: U/omega (or U/omega_m), Omega/omega, omega_m.
 

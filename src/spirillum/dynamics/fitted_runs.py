@@ -23,10 +23,9 @@ from spirillum.progress import Progress, tell
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, without_reynolds_bound
 from spirillum.scalars import is_whole
-from spirillum.swimming.intervals import intervals_over, sampled_batch
+from spirillum.swimming.intervals import PosteriorFor, intervals_over, sampled_batch, sampled_discrepancy
 from spirillum.swimming.motions import LEVEL, Intervals, Swimming
 from spirillum.swimming.preparation import ModelChoice, choose_model
-from spirillum.swimming.sampled_resistance import PosteriorFor, sampled_discrepancy
 from spirillum.swimming.steady import one_after_another
 
 if TYPE_CHECKING:
@@ -116,7 +115,8 @@ def discrepancy_factors(
     whose: PosteriorFor = "new",
 ) -> dict[str, Samples]:
     """Factors of a model's discrepancy on the mean speed and rates of a run of each draw, (draws,) each."""
-    off = sampled_discrepancy(posterior, predicted, rng, robot if whose == "measured" else None)
+    tail = posterior.measured(robot) if whose == "measured" else None
+    off = sampled_discrepancy(posterior, predicted, rng, tail)
     one = np.ones_like(off["advance"])
     if robot.drive is not None and robot.drive.joint == "fixed":
         off["turning"] = one

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Reach, integrate, observed_at
+from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.release import InTube, Release, released_state
 from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
@@ -249,7 +249,7 @@ def free_motion(
     table = table_of_run(ready, release, progress)
     held, links = prepare_release(ready, table.packed, release, tail_rate, friction)
     state = released_state(ready, links, release.placement, release.in_tube.azimuth)
-    gap = float(observed_at(links, state)[core.SEEN_FILM])
+    gap = float(links.observe_state(state)[core.SEEN_FILM])
     _check_until(until, gap)
     load_size = abs(float(links.weight[: core.WEIGHT_MOMENT_BODY].sum())) * links.length
     heavy = load_size > _LIGHT * links.torque

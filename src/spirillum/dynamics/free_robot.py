@@ -178,6 +178,10 @@ class FreeRobot(ABC):
         core.observe(time, states, self.data, self.table, out)
         return out
 
+    def observe_state(self, state: Samples) -> Samples:
+        """What is observed in one state: (13,), or (31,) in a tube."""
+        return np.asarray(self.observe(np.zeros(1), state[None])[0])
+
     def gaps(self, state: Samples) -> Samples:
         """Gaps that are watched in a state, (19,), m: at every site, and last the smallest of the wire, in a tube."""
         found = np.empty(self.gap_count)

@@ -175,11 +175,6 @@ def run_sizes(robot: FreeRobot) -> Samples:
     return sizes
 
 
-def observed_at(robot: FreeRobot, state: Samples) -> Samples:
-    """Return the observed quantities of one state, (13,), or (31,) in a tube."""
-    return np.asarray(robot.observe(np.zeros(1), state[None])[0])
-
-
 def _duty(switches: Sequence[Switch], time: float) -> float:
     return switches[bisect_right(switches, time, key=lambda switch: switch.time) - 1].duty
 
@@ -196,7 +191,7 @@ def _stretch(
 ) -> tuple[Samples, Samples, str]:
     """A run between two switchings: its moments, its states, and what ended it early, or nothing."""
     data = robot.data
-    outside = float(observed_at(robot, run.state)[core.SEEN_OUTSIDE]) if robot.table.size else 0.0
+    outside = float(robot.observe_state(run.state)[core.SEEN_OUTSIDE]) if robot.table.size else 0.0
     core.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, core.STATE_SIZE))
     sizes, done = run_sizes(robot), 0

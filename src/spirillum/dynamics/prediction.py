@@ -17,9 +17,9 @@ from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, without_reynolds_bound
+from spirillum.swimming.intervals import posterior_for_of
 from spirillum.swimming.prediction import Prediction, interval_statement, predict_steady, with_posterior_medians
 from spirillum.swimming.preparation import AUTO, WALLED, choose_model
-from spirillum.swimming.sampled_resistance import posterior_for_of
 from spirillum.units import KINDS, as_given, parse_option
 
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import TwoLinks
-from spirillum.dynamics.integration import Reach, observed_at
+from spirillum.dynamics.integration import Reach
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
@@ -253,7 +253,7 @@ def released_state(robot: Robot, links: TubeRobot, placed: Placement, azimuth: f
     state = state_at_release(robot, links, placed, azimuth)
     gap = float(links.gaps(state).min())
     check_roughness(links.roughness, gap, robot.body.diameter)
-    if observed_at(links, state)[core.SEEN_OUTSIDE]:
+    if links.observe_state(state)[core.SEEN_OUTSIDE]:
         raise InputError(
             f"placement: a gap of {show(gap, 'mm')} with that pitch and yaw lies outside the robot's table; allowed: a "
             "pose nearer to level"

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Reach, Steps, observed_at, watched_limits
+from spirillum.dynamics.integration import Reach, Steps, watched_limits
 from spirillum.dynamics.release import state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
@@ -97,7 +97,7 @@ class ReturnMap:
         run = Steps.of(robot, y, 0.0, _FIRST * robot.turn)
         core.watched(y, 0.0, data, robot.table, limits, robot.roughness, run.gaps)
         nothing, none = np.empty(0), np.empty((0, core.STATE_SIZE))
-        begun = observed_at(robot, y)[core.SEEN_TURN], y[core.STATE_PHASE]
+        begun = robot.observe_state(y)[core.SEEN_TURN], y[core.STATE_PHASE]
         noted: list[Samples] = []
         jacobians: list[Samples] = []
         while self._turned(y, data[core.SEEN_TURN], begun) < 2.0 * np.pi or not noted:
@@ -144,7 +144,7 @@ class ReturnMap:
 
         def left(share: float) -> float:
             core.interpolate(share, before, new, increments, inner)
-            return self._turned(inner, observed_at(self.robot, inner)[core.SEEN_TURN], begun) - 2.0 * np.pi
+            return self._turned(inner, self.robot.observe_state(inner)[core.SEEN_TURN], begun) - 2.0 * np.pi
 
         share = float(brentq(left, 0.0, 1.0, xtol=1e-13))
         left(share)
@@ -266,7 +266,7 @@ class _Chart:
 
     def __init__(self, turns: ReturnMap, state: Samples) -> None:
         self._turns, self._robot = turns, turns.robot
-        self._phase = float(observed_at(self._robot, state)[core.SEEN_TURN] + state[core.STATE_PHASE])
+        self._phase = float(self._robot.observe_state(state)[core.SEEN_TURN] + state[core.STATE_PHASE])
         self.current = float(state[core.STATE_CURRENT])
         """Current of the motor, A: it follows the motion within a small part of a turn."""
 
@@ -307,7 +307,7 @@ class _Chart:
 
     def _chart(self, state: Samples) -> Samples:
         """What acts as these four coordinates, angles of tail and body against the wall, |q| and current, (8,)."""
-        seen, attitude = observed_at(self._robot, state), state[core.STATE_ATTITUDE : core.STATE_PHASE]
+        seen, attitude = self._robot.observe_state(state), state[core.STATE_ATTITUDE : core.STATE_PHASE]
         tail = seen[core.SEEN_TURN] + state[core.STATE_PHASE]
         pose = seen[core.SEEN_AZIMUTH], self._closeness(state), seen[core.SEEN_PITCH], seen[core.SEEN_YAW]
         return np.array([*pose, tail, seen[core.SEEN_TURN], np.linalg.norm(attitude), state[core.STATE_CURRENT]])

@@ -42,10 +42,10 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers, without_reynolds_bound
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.intervals import PosteriorFor
 from spirillum.swimming.motions import ASSUMPTION, HELD, SPEED_OF, STEADY, ReleasedMotion, TrialInterval
 from spirillum.swimming.prediction import Prediction, interval_statement, predict_steady
 from spirillum.swimming.preparation import WALLED, has_table, preparation_time, table_for, why_no_table
-from spirillum.swimming.sampled_resistance import PosteriorFor
 from spirillum.units import as_given, show, speed_unit
 
 if TYPE_CHECKING:

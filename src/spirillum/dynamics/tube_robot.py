@@ -121,6 +121,7 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     if robot.channel is None:
         raise InputError("the robot has no channel; allowed: a robot with a [channel]")
     heavy, drive = weight_of(robot) if weight else np.zeros(core.WEIGHT_SIZE), drive_of(steady.batch)
+    friction = friction_of(steady.batch, steady.friction, 0.0 if np.isnan(effective) else effective)
     a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
     drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])
     torque = torque_scale(drag, heavy, drive)
@@ -149,7 +150,7 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     found[core.WIRE_HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength if tail.form.is_helix else 0.0
     found[core.WIRE_ROOT], found[core.WIRE_LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
     return TubeRobot(
-        friction=friction_of(steady.batch, steady.friction, 0.0 if np.isnan(effective) else effective),
+        friction=friction,
         weight=heavy,
         drive=drive,
         table=np.ascontiguousarray(table),

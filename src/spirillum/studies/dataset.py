@@ -36,7 +36,6 @@ from spirillum.studies.spec import LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import REASONS, ModelTask, Part, flag_attributes, gathered
 from spirillum.swimming.motions import STEADY, Swimming
-from spirillum.swimming.scenario import accuracy_limits
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -349,7 +348,12 @@ def cautions(task: ModelTask, part: Part) -> list[Caution]:
     columns: dict[str, Any] = {item.name: part[item.name][:, 0] for item in STEADY}
     first = Swimming(**columns, valid=part["outside"][:, 0] == 0)
     found = _refusals(task, part)
-    for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
+    for limit in broken(
+        [
+            *find_swimmer_model(task.model).cautions(task.batch),
+            *reynolds_limits(task.batch, first.reynolds_number, first.tail_reynolds_number),
+        ]
+    ):
         holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
         holds |= part["outside"][:, 0] == REASONS.index("beyond-stokes")
         count = int(np.count_nonzero(~holds))

@@ -33,6 +33,7 @@ from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
 from spirillum.swimming.motions import STEADY, Swimming
+from spirillum.swimming.preparation import has_table, preparation_time, why_no_table
 from spirillum.swimming.steady import one_after_another
 from spirillum.units import show
 
@@ -179,3 +180,17 @@ def band_of(
         reference,
         tuple(left_out),
     )
+
+
+def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
+    """Limits of an answer at one pose of several, with the remedy; nothing where the pose is known."""
+    over = left_open(batch.pose, model)
+    if not over:
+        return []
+    named = f"{' and '.join(over)} {'is' if len(over) == 1 else 'are'}"
+    more = "--band gives the band over them, in minutes"
+    if not has_table(batch) and not why_no_table(batch):
+        whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
+        band = band.partition(" on ")[0]
+        more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
+    return [Note.named("pose-open", open=named, more=more, fields=over)]

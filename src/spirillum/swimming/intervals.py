@@ -3,21 +3,27 @@
 A posterior file (`posterior.nc` of `spirillum calibrate`) holds draws of fitted parameters and of the model's
 discrepancy, its relative misfit from tail to tail. Every draw is a robot of its own; a batch of them swims at once. The
 discrepancy then goes onto speed and rates, independently for each draw, for a tail that was not observed may be missed
-by as much as those that were (of one that was observed it is known better, see `spirillum.swimming.drawn_resistance`).
+by as much as those that were.
 Torques, currents, powers and efficiencies are computed from the rates and speeds that it leaves. An interval is of the
 robot's own motion, not of a single measured trial.
+
+A calibration describes the mean y over the trials of a robot by y = f (1 + tau d) + e with the prediction f, d ~
+N(0, 1) for each robot, and the error e of the mean. Of a tail that was not observed nothing is known of d but that. Of
+one that was observed, its mean tells d: given f, tau and the size of e, d is a normal number again (Gaussian
+conditioning), as well known as the mean itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Literal, cast, get_args
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
-from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.errors import InputError, check_choice
+from spirillum.fitted.posterior_file import ObservedTail, PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
@@ -32,14 +38,31 @@ from spirillum.swimming.balance import (
     steady_current,
 )
 from spirillum.swimming.motions import LEVEL, STEADY, Intervals, Swimming
-from spirillum.swimming.sampled_resistance import (
-    AxialTable,
-    PosteriorFor,
-    TubeResistance,
-    chebyshev_points,
-    sampled_discrepancy,
-)
+from spirillum.swimming.sampled_resistance import AxialTable, TubeResistance, chebyshev_points
 from spirillum.swimming.steady import KnownResistance, swim_on_floor
+
+PosteriorFor = Literal["new", "measured"]
+"""Whose discrepancy an interval holds: of a tail like those that were fitted, or of a fitted one."""
+
+
+def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -> PosteriorFor:
+    """The robot whose discrepancy is requested, `new` or `measured`."""
+    check_choice("for", name, get_args(PosteriorFor))
+    if name == "measured":
+        if posterior is None:
+            raise InputError("for = 'measured' without a posterior; allowed: with --posterior FILE")
+        if not posterior.tails:
+            raise InputError(
+                f"for = 'measured': {posterior.source} does not hold what was observed of each tail; allowed: 'new', "
+                "or a posterior of this version of `spirillum calibrate`"
+            )
+        if posterior.measured(robot) is None:
+            raise InputError(
+                f"for = 'measured': {robot.name} with its body, channel and tail is none of the "
+                f"{len(posterior.tails)} robots of {posterior.observations}; allowed: 'new', or one of these"
+            )
+    return cast("PosteriorFor", name)
+
 
 OF_TORQUE = (
     "tail_torque",
@@ -96,9 +119,9 @@ def intervals_over(
         "turning": swum.body_rotation_rate / swum.tail_rotation_rate,
         "motor_rate": swum.motor_rotation_rate,
     }
-    off = sampled_discrepancy(posterior, predicted, rng, robot if posterior_for == "measured" else None)
-    observed = posterior_for == "measured"
-    values = _with_discrepancy(swum, batch, off, own_drive=own_drive, friction=friction, observed=observed)
+    tail = posterior.measured(robot) if posterior_for == "measured" else None
+    off = sampled_discrepancy(posterior, predicted, rng, tail)
+    values = _with_discrepancy(swum, batch, off, own_drive=own_drive, friction=friction, observed=tail is not None)
     ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL, 0.5]
     limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
     nan = float("nan")
@@ -293,3 +316,66 @@ def _torques_and_powers(
             found["motor_residual_torque"] = spare - (rotor * slip if friction == "body" else 0.0)
     torques = friction_torques(find_friction_model(friction), effective, rotor)
     return found | {"effective_friction": effective, "friction_power": torques.power(body, tail)}
+
+
+def sampled_discrepancy(
+    posterior: PosteriorFile,
+    predicted: Mapping[str, Samples],
+    rng: np.random.Generator,
+    tail: ObservedTail | None = None,
+) -> dict[str, Samples]:
+    """Factors on advance, turning and motor rate, (draws,) each, of an observed tail or (None) of another one."""
+    size = next(iter(predicted.values())).size
+    found = {}
+    for name in ("advance", "turning", "motor_rate"):
+        tau = posterior.discrepancy.get(name)
+        found[name] = np.ones(size) if tau is None else 1.0 + tau * rng.normal(size=size)
+    if tail is None:
+        return found
+    names = [name for name in found if name in tail.seen and name in posterior.discrepancy and name in predicted]
+    if not names:
+        return found
+    values = np.stack([_compared(name, predicted, tail) for name in names])
+    spread = np.stack([posterior.discrepancy[name] for name in names]) * values
+    seen_of = [tail.seen[name] for name in names]
+    errors = np.stack(
+        [
+            error_of_mean(posterior.error[name], one.stated, one.scale, one.trials)
+            for name, one in zip(names, seen_of, strict=True)
+        ]
+    )
+    noise = np.einsum("qd,rd->dqr", errors, errors) * _correlations(names, tail.correlation)
+    floor = np.array([tail.floor * one.scale for one in seen_of]) ** 2
+    noise = noise + np.diag(floor)
+    # Matheron's rule: a draw of the prior, moved by what its own observation differs from the one that was made.
+    off = values * (np.stack([found[name] for name in names]) - 1.0)
+    seen = np.array([one.mean for one in seen_of])[:, None]
+    error = np.einsum("dqr,rd->qd", np.linalg.cholesky(noise), rng.normal(size=off.shape))
+    whole = noise + spread.T[:, :, None] ** 2 * np.eye(len(names))
+    gain = spread.T[:, :, None] ** 2 * np.linalg.inv(whole)
+    moved = off + np.einsum("dqr,rd->qd", gain, seen - values - off - error)
+    return found | {name: 1.0 + moved[n] / values[n] for n, name in enumerate(names)}
+
+
+def error_of_mean(
+    error: Samples | float, stated: Samples | float, scale: Samples | float, trials: Samples | float
+) -> Samples:
+    """Standard error of a mean over trials, SI: that of one trial over the root of the number of trials."""
+    # The scatter of trials holds the error of each measurement. A trial's error is thus the larger of both, no sum.
+    return np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
+
+
+def _compared(name: str, predicted: Mapping[str, Samples], tail: ObservedTail) -> Samples:
+    """What was compared: the advance is over the motor's rate where no tail rate was observed."""
+    if name == "advance" and tail.by_motor:
+        return predicted["advance"] / (1.0 - predicted["turning"])
+    return predicted[name]
+
+
+def _correlations(names: Sequence[str], correlation: float) -> Samples:
+    """Of the errors of advance and turning, which share their tail rate; none with the motor's rate."""
+    found = np.eye(len(names))
+    if "advance" in names and "turning" in names:
+        a, t = names.index("advance"), names.index("turning")
+        found[a, t] = found[t, a] = correlation
+    return found

@@ -28,7 +28,8 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import find_friction_model
-from spirillum.swimming.band import Band, band_of
+from spirillum.swimming.band import Band, band_of, no_band_warnings
+from spirillum.swimming.intervals import PosteriorFor
 from spirillum.swimming.motions import (
     STEADY,
     Intervals,
@@ -40,8 +41,7 @@ from spirillum.swimming.motions import (
     motion_of,
 )
 from spirillum.swimming.preparation import AUTO, ModelChoice, choose_model, prepared, why_no_table
-from spirillum.swimming.sampled_resistance import PosteriorFor
-from spirillum.swimming.scenario import OtherModels, Scenario, no_band_warnings, other_models
+from spirillum.swimming.scenario import OtherModels, Scenario, other_models
 from spirillum.units import KINDS, parse_option
 
 
@@ -202,8 +202,8 @@ def predict_steady(
 ) -> Prediction:
     """Predict the steady swimming of one robot with fitted values `fit`; else arguments as of `spirillum.predict`."""
     given, drawn = Placement.of(placement), fit.posterior
-    choice, where = _chosen(model, robot, fit, given)
-    ready, chosen, batch = prepared(fit.central(robot), choice.model, resolution=resolution, placement=where)
+    central, choice, where = _chosen(model, robot, fit, given)
+    ready, chosen, batch = prepared(central, choice.model, resolution=resolution, placement=where)
     reading = find_friction_model(ready.friction.reading if friction is None else friction)
     rate = _rate(tail_rate, batch.placement)
     if rate is None and ready.drive is None:
@@ -242,12 +242,8 @@ def predict_steady(
             instead = "" if why_no_table(batch) else "; `spirillum prepare` makes further answers immediate"
             tell(progress, f"{solution_message(LEVEL)}{instead}", 0, 1)
         tell(progress, solution_message(TILTED) if direct and tilted else chosen.name, 0, 1)
-    checks = scenario.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
-    result = scenario.swim(batch)
-    if not result.valid[0]:
-        raise InputError(scenario.why_not(result))
-    warnings = [*ready.warnings, *scenario.warnings(result)]
-    error = scenario.error_estimate(result, checks)
+    result, error, notes = scenario.solved()
+    warnings = [*ready.warnings, *notes]
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
     over = band_of(batch, chosen, result, scenario.swim, progress) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
@@ -277,14 +273,14 @@ def predict_steady(
     )
 
 
-def _chosen(model: str | ModelChoice, robot: Robot, fit: Fit, given: Placement) -> tuple[ModelChoice, Placement]:
-    """The model, and the placement with what a fit has found where the given one leaves it open."""
+def _chosen(model: str | ModelChoice, robot: Robot, fit: Fit, given: Placement) -> tuple[Robot, ModelChoice, Placement]:
+    """The robot with the values of a fit, the model, and the placement with what the fit has found where it is open."""
     central = fit.central(robot)
     where = fit.placed(central, given)
     choice = model if isinstance(model, ModelChoice) else choose_model(model, central, placement=where, fit=fit)
     if not where.is_set and find_swimmer_model(choice.model).placed:
         where = fit.calibrated_placement(central) or where
-    return choice, where
+    return central, choice, where
 
 
 def free_in_tube(fitted_by: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spirillum.errors import InputError
 from spirillum.fitted.fit import Fit
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
@@ -17,18 +18,11 @@ from spirillum.robot.limits import Limit, broken, in_stokes_flow, reynolds_limit
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.band import left_open
 from spirillum.swimming.motions import Motion, Swimming
-from spirillum.swimming.preparation import has_table, preparation_time, why_no_table
 from spirillum.swimming.steady import calibrated_balance, speed_error, swim, swim_on_floor
 from spirillum.units import show
 
 NO_WEIGHT = Note.named("no-masses")  #: Caution of a free motion of a robot whose masses are unknown.
-
-
-def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
-    """Return the limits of an accurate answer; each one that is exceeded is a warning."""
-    return [*model.cautions(batch), *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number)]
 
 
 def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Swimming) -> list[Limit]:
@@ -68,20 +62,6 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
     more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
     fields = [words.partition(" = ")[0] for words in differing]
     return [Note.named("calibrated-elsewhere", model=model, differs=differing[0], more=more, fields=fields)]
-
-
-def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
-    """Limits of an answer at one pose of several, with the remedy; nothing where the pose is known."""
-    over = left_open(batch.pose, model)
-    if not over:
-        return []
-    named = f"{' and '.join(over)} {'is' if len(over) == 1 else 'are'}"
-    more = "--band gives the band over them, in minutes"
-    if not has_table(batch) and not why_no_table(batch):
-        whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
-        band = band.partition(" on ")[0]
-        more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
-    return [Note.named("pose-open", open=named, more=more, fields=over)]
 
 
 CONSTANT_TORQUE = Note.named("constant-torque")  #: What a drive of given torque takes for granted.
@@ -163,19 +143,21 @@ class Scenario:
             motion=self.motion,
         )
 
-    def checked(self) -> list[Swimming]:
-        """Steady swimming at other resolutions, for the error estimate; none where the model has none."""
-        return [self.swim(self.batch, other) for other in self.model.checked_by(self.batch)]
-
-    def error_estimate(self, result: Swimming, checks: Sequence[Swimming]) -> float:
-        """Relative error of the forward velocity, see `SwimmerModel.checked_by`; NaN in closed form or with inertia."""
-        found = self.model.stated_speed_error(self.batch)
+    def solved(self) -> tuple[Swimming, float, list[Note]]:
+        """The steady motion, the relative error of its forward velocity, and what to be careful about."""
+        # The finer resolution last: a flow around the robot then finds its factors at hand.
+        checks = [self.swim(self.batch, other) for other in self.model.checked_by(self.batch)]
+        result = self.swim(self.batch)
+        limits = reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number)
+        if not result.valid[0]:
+            raise InputError(self._why_not(limits))
+        error = self.model.stated_speed_error(self.batch)
         if checks:
             speeds = [one.forward_velocity for one in (result, *checks)]
-            found = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
-        return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
+            error = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
+        return result, in_stokes_flow(error, *limits), self._warnings(result, limits)
 
-    def warnings(self, result: Swimming) -> list[Note]:
+    def _warnings(self, result: Swimming, limits: Sequence[Limit]) -> list[Note]:
         """What to be careful about: calibration, accuracy, drive, what a free motion leaves out."""
         robot, model, batch, rate = self.robot, self.model, self.batch, self.tail_rate
         known = robot  # of the user's file: without the B_eff of a calibration
@@ -186,7 +168,7 @@ class Scenario:
         placed |= robot.body.mass is not None and robot.tail.density is not None  # its weight keeps it on the floor
         return [
             *(calibration_warnings(robot, model.name) if self.calibrated else ()),
-            *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
+            *(limit.caution() for limit in broken([*model.cautions(batch), *limits])),
             *(limit.caution() for limit in broken(film_limits(robot, model, batch, result))),
             *drive_warnings(known, model, self.friction, result, rate),
             *(self._left_out() if self.motion == "free" else ()),
@@ -204,9 +186,8 @@ class Scenario:
         moves = "sinks" if weight.value > 0 else "rises"
         return [Note.named("free-without-weight", weight=show(weight.value, "N"), moves=moves)]
 
-    def why_not(self, result: Swimming) -> str:
+    def _why_not(self, limits: Sequence[Limit]) -> str:
         """Why there is no steady motion."""
-        limits = reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number)
         if problem := stokes_flow_problem(self.batch, limits):
             return problem
         if self.tail_rate is not None:
