@@ -44,6 +44,7 @@ _WHAT = "an observations file (CSV or Parquet)"
 _LARGEST = 64 << 20
 _MOST_SHOWN = 8
 _LARGEST_NUMBER = 1e6
+_DIGITS = ".13g"  # of equal numbers: sums and differences of rates are equal to rounding
 _SMALLEST_RATE = 1e-6 * Hz
 
 
@@ -223,12 +224,12 @@ def without_copies(observations: Iterable[ObservationRow]) -> tuple[list[Observa
         tail = item.motor_rate + item.body_rate if math.isnan(item.tail_rate) else item.tail_rate
         body = item.tail_rate - item.motor_rate if math.isnan(item.body_rate) else item.body_rate
         numbers = (item.forward_velocity, tail, body, *item.intervals[:3])
-        alike.setdefault((item.tail, *(f"{number + 0.0:.9g}" for number in numbers)), []).append(item)
+        alike.setdefault((item.tail, *(f"{number + 0.0:{_DIGITS}}" for number in numbers)), []).append(item)
     copies: dict[int, list[int]] = {}
     for rows in alike.values():
         first: dict[str, int] = {}
         for item in sorted(rows, key=lambda row: row.motor_derived):
-            motor = next(iter(first), "") if item.motor_derived else f"{item.motor_rate:.9g}"
+            motor = next(iter(first), "") if item.motor_derived else f"{item.motor_rate:{_DIGITS}}"
             if first.setdefault(motor, item.row) != item.row:
                 copies.setdefault(first[motor], []).append(item.row)
     notes = (Note.named("copied-trials", first=row, rows=rows_in_words(sorted(of))) for row, of in copies.items())
