@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any
 
@@ -27,6 +28,15 @@ class InputError(ValueError):
 
 class ArgumentError(InputError, TypeError):
     """A keyword that a public function does not have."""
+
+
+@contextmanager
+def led_by(source: str) -> Iterator[None]:
+    """Begin the sentences of a refusal inside with the file and field that led to what is refused."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{source}: {error}", [f"{source}: {problem}" for problem in error.problems]) from error
 
 
 def _one_line(text: str) -> str:

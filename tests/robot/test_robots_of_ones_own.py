@@ -57,7 +57,10 @@ def test_chains_that_do_not_end_are_refused(tmp_path: Path) -> None:
     with pytest.raises(sp.InputError, match="leads back to itself"):
         sp.load(one)
     two.write_text('extends = "none.toml"\n', encoding="utf-8")
-    with pytest.raises(sp.InputError, match=r"none\.toml does not exist"):
+    with pytest.raises(sp.InputError, match=r"one\.toml: extends: .*two\.toml: extends: .*none\.toml does not exist"):
+        sp.load(one)
+    two.write_text('extends = "biorob2012-wide"\nbody.profile = "none.csv"\n', encoding="utf-8")
+    with pytest.raises(sp.InputError, match=r"one\.toml: extends: .*two\.toml: .*none\.csv does not exist"):
         sp.load(one)
     two.write_text('extends = "a\\u0000b.toml"\n', encoding="utf-8")
     with pytest.raises(sp.InputError, match="is no name of a file"):

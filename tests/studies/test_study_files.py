@@ -27,7 +27,7 @@ GRID = '[grid]\nwavelengths = ["20 mm"]\namplitudes = ["2 mm"]\n[grid.channels]\
         ('assumed_motor_rates = ["0 Hz"]\n' + GRID, "assumed_motor_rates holds a rate out of range"),
         (GRID.replace("20 mm", "-20 mm"), "grid.wavelengths.0"),
         (GRID.replace('["20 mm"]', '["20 mm", "2 cm"]'), "grid.wavelengths holds a value twice"),
-        (GRID.replace("biorob2012-wide", "biorob2012-wise"), "did you mean biorob2012-wide?"),
+        (GRID.replace("biorob2012-wide", "biorob2012-wise"), "study.toml: 'biorob2012-wise' is neither a preset nor"),
         (GRID.replace("biorob2012-wide", "missing.toml"), "missing.toml does not exist"),
         ('robots = ["biorob2012-wide", "none.toml"]\n', "none.toml does not exist"),
         ("robots = []\n", "robots"),

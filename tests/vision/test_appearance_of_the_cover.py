@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.measurement.setup_template import setup_text
+from spirillum.measurement.setup_template import setup_answer, setup_text
 from spirillum.vision.camera.optics import BodyPose, optics_of
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.lone_outline import appearance_of
@@ -23,6 +23,21 @@ def test_another_word_is_refused(tmp_path):
     (tmp_path / "a.toml").write_text(setup_text().replace('# appearance = "glass"', 'appearance = "clear"'))
     with pytest.raises(InputError, match=r"robot\.appearance = 'clear'.*'opaque'"):
         load_setup(tmp_path / "a.toml")
+
+
+def test_what_a_setup_names_is_refused_under_its_name(tmp_path):
+    """Its robot, and the pictures of a checkerboard, as `measure` would refuse them."""
+    path = tmp_path / "a.toml"
+    path.write_text(setup_text().replace('file = "biorob2012-wide"', 'file = "none.toml"'))
+    with pytest.raises(InputError, match=r"a\.toml: robot\.file: none\.toml does not exist"):
+        load_setup(path)
+    board = 'images = "board"\ncolumns = 9\nrows = 6\nsquare = "10 mm"'
+    path.write_text(f"{setup_text()}\n[camera.checkerboard]\n{board}\n")
+    with pytest.raises(InputError, match=r"a\.toml: camera\.checkerboard\.images: .*board is no folder"):
+        setup_answer(path)
+    (tmp_path / "board").mkdir()
+    with pytest.raises(InputError, match=r"a\.toml: camera\.checkerboard\.images: .*board holds 0 pictures"):
+        setup_answer(path)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BeforeValidator
 
-from spirillum.errors import InputError, check_names
+from spirillum.errors import InputError, check_names, led_by
 from spirillum.files import read_toml
 from spirillum.robot.arguments import Options, in_range, refusal, within
 from spirillum.robot.fields import Angle, Current, LengthOrZero, Section, Time, Velocity
@@ -151,10 +151,8 @@ class Lab(Section):
     def read(cls, path: str | Path | None, changes: Mapping[str, Any]) -> Self:
         """A lab from its file, with fields changed by dotted name, as ``{"camera.latency": "50 ms"}``."""
         tables: dict[str, Any] = {} if path is None else read_toml(Path(path), _WHAT)
-        try:
+        with led_by(str(path)):
             whole = cls._from(tables, written=True)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
         for name, value in changes.items():
             table, dot, entry = name.partition(".")
             if not dot or not isinstance(tables.get(table, {}), dict):

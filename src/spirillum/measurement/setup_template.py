@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.envelope import envelope, quantity
+from spirillum.errors import led_by
 from spirillum.files import new_file, output_target, parse_toml
 from spirillum.notes import Note
 from spirillum.robot.fields import field_values, problems_in
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import opened, samples_of
+from spirillum.vision.camera.scale import pictures_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import WHAT, Setup, load_setup
 from spirillum.vision.track.learning import learnt_from
@@ -137,6 +139,9 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
 def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, Any]:
     """The answer of `spirillum setup check`: fields in SI, what uncertain heights do to lengths, what a video shows."""
     setup, robot = load_setup(path)
+    if setup.camera.checkerboard is not None:
+        with led_by(str(path)):
+            pictures_of(setup.camera.checkerboard, Path(path).parent)
     fields = {
         name: value if unit is None else quantity(value, unit.replace("**", "^"))
         for name, value, unit in field_values(setup)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, did_you_mean, led_by
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.notes import Note
 from spirillum.robot.arguments import check_set_once
@@ -98,11 +98,11 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
     check_set_once(overrides)
     table, source = raw_table(robot)
     folder = Path() if isinstance(robot, Mapping) else Path(robot).parent
-    table, changes = _extended(with_points_of_files(table, folder), source, folder)
+    table, changes = _extended(with_points_of_files(table, folder, source), source, folder)
     for path, value in overrides.items():
         _displace(table, _nested(path, value))
         _set_field(table, path.split("."), value, path)
-    table = with_points_of_files(table, Path())
+    table = with_points_of_files(table, Path(), source)
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
     robot = _checked(table, source, tuple(_stale(table, changes)))
     robot._warnings = (*robot.warnings, *_old_coupling(robot, changes))  # noqa: SLF001 - it is the loader's to set
@@ -212,8 +212,9 @@ def _extended(
             f"{source}: extends = {base[:60]!r} leads back to itself or through more than {_MOST_LAYERS} files; "
             f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
         )
-    under = with_points_of_files(read_toml(path, _WHAT), path.parent)
-    below, layers = _extended(under, str(path), path.parent, (*above, _resolved(path, source)))
+    with led_by(f"{source}: extends"):
+        under = with_points_of_files(read_toml(path, _WHAT), path.parent, str(path))
+        below, layers = _extended(under, str(path), path.parent, (*above, _resolved(path, source)))
     return _merge_tables(below, base, table), [*layers, changed]
 
 

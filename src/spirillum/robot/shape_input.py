@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, led_by
 from spirillum.files import read_text
 from spirillum.files.limits import MOST_POINTS
 from spirillum.files.reading import csv_rows, number_in
@@ -92,12 +92,13 @@ def _is_written_number(cell: str) -> bool:
     return True
 
 
-def with_points_of_files(table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """A robot's raw tables with the points of the files that they name, looked for from a folder."""
+def with_points_of_files(table: dict[str, Any], folder: Path, source: str) -> dict[str, Any]:
+    """The raw tables of a robot from `source` with the points of the files that they name, looked for from a folder."""
     for (section, name), columns in FILES.items():
         inner = table.get(section)
         if isinstance(inner, Mapping) and isinstance(inner.get(name), (str, Path)) and inner[name] != "none":
-            points = read_points(folder / str(inner[name]), columns, f"{section}.{name}")
+            with led_by(source):
+                points = read_points(folder / str(inner[name]), columns, f"{section}.{name}")
             table = {**table, section: {**inner, name: points}}
     return table
 

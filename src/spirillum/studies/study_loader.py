@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import PerRobot
-from spirillum.errors import InputError
+from spirillum.errors import InputError, led_by
 from spirillum.files import read_toml
 from spirillum.fitted.calibration_file import CalibrationFile, FittedFriction, calibrated_robot
 from spirillum.fitted.fit import NO_FIT, Fit, check_not_overridden, read_fit
@@ -136,10 +136,8 @@ def load_study(
     robots = fitted
     _check_varied(study, overrides or {}, name)
     study, reason = _with_models(study, robots, fit, name)
-    try:
+    with led_by(name):
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from error
     _check_room(study, robots, name)
     _check_contact(study, robots, name)
     placements = _fitted_poses(study, robots, fit)
@@ -332,12 +330,8 @@ def _robot(entry: str, folder: Path, overrides: Mapping[str, Any], varied: Mappi
     """A robot of the study; a file stands relative to the study's folder."""
     beside = folder / entry
     source = beside if Path(entry).suffix and not Path(entry).is_absolute() else entry
-    try:
+    with led_by(f"{name}, with vary" if varied else name):
         return load(source, **{**overrides, **varied})
-    except InputError as error:
-        if not varied:
-            raise
-        raise InputError(f"{name}, with vary: {error}") from error
 
 
 _NAMES = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")

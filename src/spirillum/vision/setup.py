@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.errors import led_by
 from spirillum.files import read_toml
 from spirillum.robot.fields import Length, LengthOrZero, Section, Text, Time, problems_in, refused_table
 from spirillum.robot.geometry import Stripes
@@ -140,8 +141,9 @@ def load_setup(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
     if isinstance(checked, list):
         raise refused_table(checked, str(path))
     beside = path.parent / checked.robot.file
-    robot = load(beside if beside.is_file() else checked.robot.file, **(overrides or {}))
-    robot.check_body("the tracker, which follows the body's outline,")
+    with led_by(f"{path}: robot.file"):
+        robot = load(beside if beside.is_file() else checked.robot.file, **(overrides or {}))
+        robot.check_body("the tracker, which follows the body's outline,")
     return checked, robot
 
 

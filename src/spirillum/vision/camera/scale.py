@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.display import counted
 from spirillum.errors import InputError
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, optics_of
@@ -36,12 +37,22 @@ class Lens(NamedTuple):
     pictures: int  #: Number of pictures in which the board was detected.
 
 
-def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: Display = AS_STORED) -> Lens:
-    """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion."""
+def pictures_of(board: Checkerboard, folder: Path) -> list[Path]:
+    """Return the pictures of a checkerboard, beside a setup file in a folder."""
     images = folder / board.images
     if not images.is_dir():
-        raise InputError(f"camera.checkerboard.images = {board.images!r} is no folder; allowed: a folder of pictures")
+        raise InputError(f"camera.checkerboard.images: {images} is no folder; allowed: a folder of pictures")
     names = sorted(entry for entry in images.iterdir() if entry.suffix.lower() in IMAGES)
+    if len(names) < _FEWEST:
+        raise InputError(
+            f"camera.checkerboard.images: {images} holds {counted(len(names), 'picture')}; allowed: at least {_FEWEST}"
+        )
+    return names
+
+
+def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: Display = AS_STORED) -> Lens:
+    """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion."""
+    images, names = folder / board.images, pictures_of(board, folder)
     pattern, found = (board.columns, board.rows), []
     for name in names:
         stored, header = read_image(name, grey=True), read_header(name)
