@@ -107,7 +107,7 @@ def test_other_models_say_what_they_say_alone(answer: Any) -> None:
         assert item.forward_velocity == pytest.approx(alone, rel=1e-12)
         assert item.ratio == pytest.approx(alone / answer.forward_velocity, rel=1e-12)
         assert f"{model} {item.ratio:.2g}" in beside.statement
-    assert beside.to_dict()["answers"][0]["forward_velocity"]["unit"] == "m/s"
+    assert answer.to_dict()["other_models"]["answers"][0]["forward_velocity"]["unit"] == "m/s"
 
 
 def test_other_models_are_left_out_where_they_answer_another_question() -> None:

@@ -238,13 +238,13 @@ def free_motion(
             raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
     ready = fit.central(robot)
     requested = requested._replace(placement=fit.placed(ready, requested.placement))
-    if ready.drive is not None and ready.drive.kind == "magnetic":
-        raise InputError(
-            "drive.kind = 'magnetic': the motion depends on the phase of the field; allowed: drive.kind = "
-            "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
-        )
     release = requested.with_contact(fit.contact())
-    if ready.channel is not None:
+    if ready.channel is not None:  # without one, its table is refused
+        if ready.drive is not None and ready.drive.kind == "magnetic":
+            raise InputError(
+                "drive.kind = 'magnetic': the motion depends on the phase of the field; allowed: drive.kind = "
+                "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
+            )
         _check_until(until, gap_of(release.placement, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_of_run(ready, release, progress)
     held, links = prepare_release(ready, table.packed, release, tail_rate, friction)

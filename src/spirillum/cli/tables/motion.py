@@ -88,7 +88,8 @@ def _in_the_lab(answer: Answer, released: Sequence[str]) -> Iterator[str]:
 def _over_poses(answer: Answer, column: str) -> str:
     """Return the pose of a value, and the range of poses of its band."""
     pose = answer["placement"]
-    given = f"{column}: at a fixed pose ({', '.join(f'{name} {in_words(pose[name])}' for name in ('gap', 'pitch'))})"
+    known = ", ".join(f"{name} {in_words(pose[name])}" for name in ("gap", "pitch") if name in pose)
+    given = f"{column}: at a fixed pose ({known})"
     if "band" not in answer:
         return given
     ranges = ", ".join(f"{name} {range_words(pose[name])}" for name in ("gap", "pitch") if "low" in pose[name])
