@@ -43,6 +43,16 @@ def test_means_of_an_exponential_start(decay: float, samples: int) -> None:
     assert float(run["mean_forward_velocity"]) < 0.01 * speed  # the remote is off for most of the last two thirds
 
 
+@pytest.mark.parametrize("samples", [1, 100, 320])
+def test_the_last_two_thirds_of_a_short_run_hang_on_no_sample(decay: float, samples: int) -> None:
+    """The mean of U_0 (1 - exp(-t/tau)) over them, from the ends of a run that starts, however few its samples."""
+    speed, end = sp.predict(robot(), model="rft").forward_velocity, 0.01
+    run = held(duration=end, samples_per_turn=samples)
+    left = decay * (np.exp(-end / 3.0 / decay) - np.exp(-end / decay))
+    expected = speed * (1.0 - left / (end - end / 3.0))
+    assert float(run["mean_forward_velocity"]) == pytest.approx(expected, rel=1e-6)
+
+
 def test_each_stretch_counts_for_its_length(decay: float) -> None:
     """Two times on add up; a pause, however long, does not count."""
     run = held(duration=4.0, on=[(0.0, 0.5), (3.0, 3.5)])

@@ -81,6 +81,7 @@ def read_duty(path: str | Path) -> list[Switch]:
 TRIAL_DURATION = 20.0  #: Length of a run in a tube, and of a trial, where none is given, s.
 _LARGEST_SAMPLES = 1_000_000
 _SHORTEST = 1e-6  # Shortest run, in turns.
+_FEW_SAMPLES = 100  # Number from which on means over a part of a run do not depend on where the samples are.
 _ROUNDING = 1e-9  # Difference of two times that is rounding, over the distance of two samples.
 
 
@@ -140,7 +141,9 @@ class Timing(Options):
                 f"samples_per_turn = {self.samples_per_turn} makes {count} samples in {end:g} s; allowed: at most "
                 f"{_LARGEST_SAMPLES} in all, as of a shorter time"
             )
-        time = np.linspace(0.0, end, max(count, 1) + 1)
+        if count < _FEW_SAMPLES:  # one of them where the last two thirds begin, over which means are taken
+            count = 3 * math.ceil(count / 3)
+        time = np.linspace(0.0, end, count + 1)
         for switch in switches:
             nearest = round(switch.time / end * (time.size - 1))
             if 0 < nearest < time.size - 1 and abs(time[nearest] - switch.time) < _ROUNDING * time[1]:
