@@ -146,7 +146,7 @@ def damaged(fitted: Path) -> Path:
         ({"posterior": "calibration.toml"}, "is not a NetCDF-4 file"),
         ({"posterior": "other.nc"}, "is no posterior of a calibration"),
         ({"posterior": "unmixed.nc"}, "unmixed.nc has not converged"),
-        ({"posterior": "cut.nc"}, "cut.nc cannot be read"),
+        ({"posterior": "cut.nc"}, "cut.nc cannot be read: it is damaged, cut off, or of another program; allowed"),
         ({"posterior": "posterior.nc", "model": "rft"}, "is of model 'sbt', not 'rft'"),
         ({"posterior": "posterior.nc", "calibration": "calibration.toml"}, "a posterior alone"),
         ({"posterior": "posterior.nc", "calibrated": False}, "a posterior alone"),

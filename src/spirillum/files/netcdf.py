@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import h5py
     import xarray as xr
 
+DAMAGED = "is damaged, cut off, or of another program"  #: Why a file of results cannot be read.
 _BEGINS = b"\x89HDF\r\n\x1a\n"
 _DEEPEST = 6
 _LONGEST_TEXTS = 64 << 20
@@ -101,8 +102,7 @@ def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> I
     except (InputError, KeyboardInterrupt, SystemExit):
         raise
     except Exception as error:  # a damaged file raises whatever the libraries meet first
-        first = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{path} cannot be read ({first[:150]}); allowed: {what}") from error
+        raise InputError(f"{path} cannot be read: it {DAMAGED}; allowed: {what}") from error
 
 
 def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> xr.Dataset:

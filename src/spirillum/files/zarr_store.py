@@ -18,6 +18,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.files.limits import checked_path
 from spirillum.files.locks import private_folder
+from spirillum.files.netcdf import DAMAGED
 from spirillum.files.writing import synced
 
 if TYPE_CHECKING:
@@ -163,5 +164,5 @@ def opened_store(folder: Path) -> xr.Dataset:
     try:
         dataset: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=True, decode_times=False)
     except Exception as error:  # a damaged store raises whatever the libraries meet first
-        raise InputError(f"{folder} cannot be read ({str(error)[:120]}); allowed: a store of this study") from error
+        raise InputError(f"{folder} cannot be read: it {DAMAGED}; allowed: a store of this study") from error
     return dataset
