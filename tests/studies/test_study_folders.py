@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.files import MARK
 from spirillum.studies.study_loader import load_study
 from spirillum.studies.work import ModelTask, run_job, tasks
 
@@ -110,12 +111,12 @@ def test_damaged_mark_and_file_in_place_of_a_folder_are_refused(small: dict[str,
 def test_dataset_of_another_version_is_computed_anew(small: dict[str, object], tmp_path: Path) -> None:
     sp.study(small, output=tmp_path / "a")
     shutil.copytree(tmp_path / "a", tmp_path / "b")
-    (tmp_path / "b" / "dataset.nc").write_bytes(b"not NetCDF")
+    (tmp_path / "b" / "dataset.nc").write_text(f"not NetCDF\n{MARK}\n")
     assert sp.study(small, output=tmp_path / "b").identical(sp.study(small, output=tmp_path / "a"))
     assert json.loads((tmp_path / "b" / "study.json").read_text())["title"] == "Four tails"
 
 
-@pytest.mark.parametrize("name", ["ranking.csv", "claims.json", "report.html"])
+@pytest.mark.parametrize("name", ["dataset.nc", "ranking.csv", "claims.json", "report.html"])
 def test_a_foreign_file_in_a_folder_of_a_study_is_refused_before_the_work(
     small: dict[str, object], tmp_path: Path, name: str
 ) -> None:
@@ -124,7 +125,8 @@ def test_a_foreign_file_in_a_folder_of_a_study_is_refused_before_the_work(
     (tmp_path / name).write_text("rank;robot\n" if name == "ranking.csv" else "{}")
     with pytest.raises(sp.InputError, match=f"{name} is there and of unknown origin"):
         sp.study(small, output=tmp_path)
-    assert not (tmp_path / "dataset.nc").exists()
+    assert {path.name for path in tmp_path.iterdir()} & {"dataset.nc", "figures"} <= {name}
+    assert (tmp_path / name).stat().st_size < 20
     (tmp_path / name).unlink()
     sp.study(small, output=tmp_path, figures=False)
     sp.study(small, output=tmp_path, figures=False)

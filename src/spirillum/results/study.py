@@ -254,9 +254,10 @@ def study(  # noqa: PLR0913 - the options of the command
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         with process_beside(partial(load_figures, *_DRAWING)) if figures and workers != 1 else nullcontext() as beside:
             if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
+                check_replaceable(folder / "dataset.nc")
                 parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
                 dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
-                write_dataset(dataset, folder / "dataset.nc", replace="any")
+                write_dataset(dataset, folder / "dataset.nc")
                 shutil.rmtree(parts, ignore_errors=True)
             if figures:
                 write_report(dataset, folder, on_progress, vector=vector, beside=beside)
