@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of, content_of
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.axial_robot import axial_robot
 from spirillum.dynamics.plant import Plant
-from spirillum.envelope import as_json, envelope, quantity
+from spirillum.envelope import as_json, quantity
 from spirillum.errors import InputError, check_choice
 from spirillum.exports.descriptions import (
     UnitedBody,
@@ -210,37 +211,17 @@ class Export(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """Content of `spirillum export --json`."""
-        content: dict[str, Any] = {
-            "robot": self.robot.name,
-            "phase": quantity(self.phase, "rad"),
-            "files": [{"file": str(item.path), "holds": item.holds} for item in self.files],
-            "links": {
+        numbers = () if self.unit is None else self.unit.parameters.values()
+        return answer_of(
+            self,
+            links={
                 name: {key: value for key, value in link_masses(link).items() if key != "inertia"}
                 for name, link in zip(("body", "rotor"), self.links, strict=True)
             },
-            "pieces": [
-                {
-                    "name": piece.name,
-                    "part": piece.part,
-                    "triangles": len(piece.faces),
-                    "volume": quantity(piece.volume, "m^3"),
-                    "watertight": is_watertight(piece.vertices, piece.faces),
-                }
-                for piece in self.pieces
-            ],
-        }
-        if self.solid is not None:
-            content["solid"] = dict(self.solid)
-        if (unit := self.unit) is not None:
-            numbers = unit.parameters.values()
-            content |= {
-                **unit.prediction.answered_by,
-                "motion": unit.motion,
-                "friction": unit.prediction.friction,
-                "inputs": ["remote", "duty", *(["mean_flow"] if unit.flow is not None else [])],
-                "parameters": {item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in numbers},
-            }
-        return envelope("export", content, self.warnings)
+            pieces=[content_of(one, watertight=is_watertight(one.vertices, one.faces)) for one in self.pieces],
+            inputs=["remote", "duty", *(["mean_flow"] if self.unit and self.unit.flow is not None else [])],
+            parameters={item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in numbers},
+        )
 
 
 def export(

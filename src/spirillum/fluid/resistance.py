@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
@@ -60,18 +60,7 @@ class Resistance(DisplayMixin):
         """Content of `spirillum resistance --json`."""
         count = len(self.matrix) // 6
         units = [row * count for row in _UNITS] * count
-        content = {
-            "robot": self.robot.name,
-            "model": self.model.name,
-            "part": self.part,
-            **({"links": list(_LINKS)} if self.part == _BOTH else {}),
-            "about": self.about,
-            "phase": quantity(self.phase, "rad"),
-            "placement": self.placement,
-            "matrix": {**quantity(self.matrix, ""), "unit": units},
-            "references": list(self.references),
-        }
-        return envelope("resistance", content, self.warnings)
+        return answer_of(self, links=_LINKS if self.part == _BOTH else (), units=units)
 
 
 def _with_accuracy(

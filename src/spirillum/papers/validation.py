@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import answer_of, content_of
 from spirillum.citations import REFERENCES
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope
 from spirillum.papers.case import (
     Case,
     CasePoint,
@@ -165,20 +165,8 @@ class CaseResult:
 
     def to_dict(self) -> dict[str, Any]:
         """The case as data, without its rows."""
-        return {
-            "case": self.name,
-            "title": self.case.title,
-            "references": [REFERENCES[key] for key in self.case.references],
-            "source": self.case.source,
-            "read": self.case.read,
-            "kind": self.case.kind,
-            "ratios": [asdict(one) for one in self.summaries],
-            "assumptions": [{"name": one.name, "values": one.values} for one in self.case.assumptions],
-            "statements": [
-                {**claim.to_dict(), "read": read} for claim, read in zip(self.statements, self.read, strict=True)
-            ],
-            "explanation": self.case.explanation,
-        }
+        judged = [{**asdict(one), "read": read} for one, read in zip(self.statements, self.read, strict=True)]
+        return content_of(self, references=[REFERENCES[key] for key in self.case.references], judged=judged)
 
 
 @dataclass(frozen=True, repr=False)
@@ -200,13 +188,7 @@ class Validation(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """Content of `spirillum validate --json`, SI."""
-        content = {
-            "cases": [case.to_dict() for case in self.cases],
-            "rows": [row.to_dict() for row in self.rows],
-            "left_recorded_range": len(self.outside),
-            **({"folder": self.folder} if self.folder else {}),
-        }
-        return envelope("validation", content, ())
+        return answer_of(self, left=len(self.outside))
 
     def __repr__(self) -> str:
         """The cases in a line."""

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer_entries import content_of
+from spirillum.answer_entries import answer_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
@@ -144,38 +144,17 @@ class Prediction(DisplayMixin):
 
     def to_dict(self, *, others: bool = True, other_models: bool = True) -> dict[str, Any]:
         """The answer of `spirillum predict --json`; with `others`, trial and steady motion stand in these."""
-        band = self.band
         beside = self.other_models if others and other_models else None
         wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}
         if wanted:
             vars(self).update(zip(wanted, run_together(*wanted.values()), strict=True))
-        over = band or self.intervals
+        over = self.band or self.intervals
         quantities = {
             name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))
             for name, (unit, _) in _QUANTITIES.items()
         }
-        content = {
-            "robot": self.robot.name,
-            **self.answered_by,
-            "friction": self.friction,
-            "calibrated": self.calibrated,
-            "motion": self.motion,
-            **quantities,
-            **({"interval_of": self.interval_of} if self.interval_of else {}),
-            "placement": self.placement,
-            **({"lying": self.lying.to_dict()} if self.lying else {}),
-            **({"band": band.to_dict()} if band else {}),
-            **({"other_models": content_of(beside)} if beside else {}),
-            **({name: getattr(self, name).to_dict() for name in self.released} if others else {}),
-            "error_estimate": quantity(
-                self.error_estimate,
-                "1",
-                **({} if self.model.error_against is None else {"against": self.model.error_against}),
-                statement=self.known_error,
-            ),
-            "references": list(self.references),
-        }
-        return envelope("prediction", content, self.warnings)
+        motions = {name: getattr(self, name) for name in self.released} if others else {}
+        return answer_of(self, quantities=quantities, beside=beside, motions=motions)
 
 
 _QUANTITIES: dict[str, tuple[str, str]] = {item.name: (item.unit, item.meaning) for item in STEADY}

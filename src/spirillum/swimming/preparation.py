@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fluid.model import SwimmerModel
@@ -189,25 +190,7 @@ class Prepared(DisplayMixin):
     @property
     def content(self) -> dict[str, Any]:
         """The answer without its schema and warnings."""
-        held, geometry = range_of(self.table.packed), self.table.geometry
-        return {
-            "robot": self.robot.name,
-            "wavelength": quantity(geometry.wavelength, "m"),
-            "amplitude": quantity(geometry.amplitude, "m"),
-            "channel_diameter": quantity(2.0 * self.table.radius, "m"),
-            "model": "tube",
-            "stage": self.table.stage,
-            "places": self.table.places,
-            "error": {name: quantity(value, "1") for name, value in self.table.error.items()},
-            "error_without_yaw": {name: quantity(value, "1") for name, value in self.table.error_without_yaw.items()},
-            "valid": {
-                "gap": quantity(held.gaps, "m", meaning="of a level robot, where the next three hold"),
-                "pitch_up": quantity(held.up, "rad", meaning="largest pitch nose up"),
-                "pitch_down": quantity(held.down, "rad", meaning="largest pitch nose down"),
-                "yaw": quantity(held.yaw, "rad", meaning="largest yaw of a level robot to either side"),
-            },
-            "seconds": quantity(self.table.seconds, "s"),
-        }
+        return content_of(self, diameter=2.0 * self.table.radius, held=range_of(self.table.packed))
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
