@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
@@ -20,15 +19,15 @@ from spirillum.robot.model_options import ModelOptions, RftOptions, SlenderOptio
 from spirillum.studies.ranking import (
     ENDS,
     Best,
-    RankedRobot,
     StudyRanking,
     best_in_words,
     can_be_ranked,
     order_in_words,
+    ranked_columns,
     ranking_of,
     unit_of_ranked,
 )
-from spirillum.units import among, display_unit, in_unit
+from spirillum.units import display_unit, in_unit
 
 FRICTION_MEANINGS = {
     "none": "no friction: the tail turns against the fluid alone, so that rates and speeds are upper bounds",
@@ -45,11 +44,10 @@ MOST_WARNINGS = 100
 
 def ranking_content(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, Any]:
     """The ranking as people read it: what it rests on, the best robots, a row for each of the first."""
-    sizes: dict[str, list[float]] = {}  # by SI unit: all speeds have one unit
-    for name in ranking.quantities:
-        sizes.setdefault(unit_of_ranked(name), []).extend(robot.values[name] for robot in ranking.robots)
-    units = {name: _unit_among(name, sizes[unit_of_ranked(name)]) for name in ranking.quantities if ranking.robots}
-    first = ranking.robots[:most]
+    robots = ranking.to_dict()["robots"]
+    columns = [
+        column for name in ranking.quantities for column in ranked_columns(robots, name, ranking.model, wide=True)
+    ]
     return {
         "message": ranking.message,
         "basis": f"model {ranking.model}, friction {ranking.friction}"
@@ -58,16 +56,10 @@ def ranking_content(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str,
         "first": order_in_words(ranking.lead, held=ranking.held).capitalize(),
         "ends": ENDS.get(ranking.kind, ""),
         "best": [best_in_words(best.to_dict(), _size(best), held=ranking.held) for best in ranking.best],
-        "header": ["robot", *(ranking.heading(name, unit) for name, unit in units.items())],
-        "rows": [[robot.name, *(_ranked_cell(robot, name, units[name]) for name in units)] for robot in first],
-        "more": len(ranking.robots) - len(first),
+        "header": ["robot", *(title for title, _ in columns)],
+        "rows": [[one["robot"], *(cells[n] for _, cells in columns)] for n, one in enumerate(robots[:most])],
+        "more": max(len(ranking.robots) - most, 0),
     }
-
-
-def _unit_among(name: str, values: Sequence[float]) -> str:
-    """The unit for people of a quantity of several robots; NaN for those without an answer."""
-    known = [value for value in values if not math.isnan(value)] or [0.0]
-    return among(max(known, key=abs), unit_of_ranked(name), known)
 
 
 def _size(best: Best) -> str:
@@ -75,14 +67,6 @@ def _size(best: Best) -> str:
     value, unit = best.robot.values[best.quantity], unit_of_ranked(best.quantity)
     shown = display_unit(value, unit)
     return f"{in_unit(value, unit, shown)} {shown}".removesuffix(" 1")
-
-
-def _ranked_cell(robot: RankedRobot, name: str, unit: str) -> str:
-    """Value and ends of a quantity of a robot, in a unit."""
-    value, low, high = (in_unit(of[name], unit_of_ranked(name), unit) for of in (robot.values, robot.low, robot.high))
-    if math.isnan(robot.values[name]):
-        return "-"
-    return value if math.isnan(robot.low[name]) else f"{value} ({low} to {high})"
 
 
 def content(dataset: xr.Dataset) -> dict[str, Any]:

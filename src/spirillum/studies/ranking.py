@@ -11,7 +11,7 @@ robot is the fastest is more informative than how far the bands overlap.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -185,6 +185,27 @@ _AT_A_POSE = " at a fixed pose"
 def order_in_words(lead: str, *, held: bool) -> str:
     """Return by which speed robots are ordered."""
     return f"{RANKED[lead].superlative}{_AT_A_POSE if held else ''} first"
+
+
+def ranked_columns(
+    robots: Sequence[Mapping[str, Any]], name: str, model: str, *, wide: bool
+) -> list[tuple[str, list[str]]]:
+    """Titles and cells of a quantity of ranked robots, with its band: in brackets, or not `wide` in columns."""
+    own = robots[0][name]["unit"]
+    if not any(item[name]["value"] for item in robots):
+        return []
+    alike = [other for other in robots[0] if other != "robot" and robots[0][other]["unit"] == own]  # speeds: one unit
+    shown = display_unit(max(abs(item[other]["value"] or 0.0) for item in robots for other in alike), own)
+    ends = [end for end in ("low", "high") if any(end in item[name] for item in robots)]
+    columns = [[in_unit(item[name].get(end), own, shown) for item in robots] for end in ("value", *ends)]
+    _, lead, *_ = robots[0]
+    title = ranked_as(name, lead, model).heading(shown)
+    if wide and ends:
+        values = [one if low == "-" else f"{one} ({low} to {high})" for one, low, high in zip(*columns, strict=True)]
+        return [(title, values)]
+    if name != "forward_velocity" or STEADY_SPEED in robots[0]:  # else the table is wider than a terminal
+        ends = []
+    return list(zip([title, *ends], columns, strict=False))
 
 
 def best_in_words(best: Mapping[str, Any], size: str = "", *, held: bool = False) -> str:

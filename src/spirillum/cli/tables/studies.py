@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rich.markup import escape
 from rich.table import Table
@@ -23,7 +23,7 @@ from spirillum.cli.tables.parts import (
 from spirillum.designs.design_result import ALTERNATIVES
 from spirillum.display import counted, percent
 from spirillum.notes import notes_in_answer
-from spirillum.studies.ranking import ENDS, HELD, STEADY_SPEED, best_in_words, order_in_words, ranked_as
+from spirillum.studies.ranking import ENDS, HELD, best_in_words, order_in_words, ranked_columns
 from spirillum.units import display_unit, in_unit
 
 
@@ -78,8 +78,8 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
         yield f"no robot has an answer{': ' if why else ''}{'; '.join(why)}"
         return
     _, lead, *_ = robots[0]
-    titles = {name: ranked_as(name, lead, ranking["model"]).heading for name in robots[0] if name != "robot"}
-    columns = [column for name, heading in titles.items() for column in _columns(robots, name, heading)]
+    model, names = ranking["model"], [name for name in robots[0] if name != "robot"]
+    columns = [column for name in names for column in ranked_columns(robots, name, model, wide=False)]
     walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
     order = f"{order_in_words(lead, held=ranking['held'])}{'; beside it' if lead == HELD else ''}"
     found = grid(f"{order}: model {ranking['model']}, friction {ranking['friction']}{walls}", "", "robot")
@@ -98,24 +98,6 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
     if ranking["low_and_high"] in ENDS:
         where = ", of robots at a fixed pose: in ranking.csv" if "settled" in ranking else ""
         yield Detail(f"low, high: {ENDS[ranking['low_and_high']]}{where}")
-
-
-def _columns(robots: Sequence[Answer], name: str, heading: Callable[[str], str]) -> list[tuple[str, list[str]]]:
-    """Titles and cells of a quantity: its values, of the speed also the ends of its band."""
-    own = robots[0][name]["unit"]
-    if not any(item[name]["value"] for item in robots):
-        return []
-    alike = [other for other in robots[0] if other != "robot" and robots[0][other]["unit"] == own]  # speeds: one unit
-    shown = display_unit(max(abs(item[other]["value"] or 0.0) for item in robots for other in alike), own)
-    with_ends = name == "forward_velocity" and STEADY_SPEED not in robots[0]  # else the table is wider than a terminal
-    ends = [end for end in ("low", "high") if with_ends and any(end in item[name] for item in robots)]
-    return [
-        (
-            heading(shown) if end == "value" else end,
-            [cell(item[name], shown, end) for item in robots],
-        )
-        for end in ("value", *ends)
-    ]
 
 
 _SHOWN = (
