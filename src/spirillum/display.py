@@ -120,7 +120,7 @@ def text_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str
     lines += [f"  {name}: {text}" for name, text in _words(answer)]
     for title, part in _parts(answer) if only is None else ():
         lines += [f"  {title}", *_lines(part, "    ")]
-    lines += [f"{name}: {text}" for name, text in _errors(answer)[:-1]]
+    lines += [f"{name}: {text}" for name, text in error_words(answer.get("error_estimate"))[:-1]]
     left = len(notes) - len(cautions)
     return "\n".join([*lines, *([f"{counted(left, 'more note')}: answer.notes"] if left else [])])
 
@@ -143,7 +143,8 @@ def html_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str
         lines += [_cells((row.name, row.value, *((row.low, row.high) if banded else ()), row.unit)) for row in rows]
     head = "".join(f"<th>{name}</th>" for name in header)
     said = "".join(
-        f"<p><b>{escape(name)}:</b> {escape(text)}</p>" for name, text in (*_words(answer), *_errors(answer))
+        f"<p><b>{escape(name)}:</b> {escape(text)}</p>"
+        for name, text in (*_words(answer), *error_words(answer.get("error_estimate")))
     )
     notes = "".join(f"<p><b>{note.severity}:</b> {escape(note)}</p>" for note in notes_in_answer(answer))
     table = f"<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody>"
@@ -204,12 +205,13 @@ def _name(table: Mapping[str, Any], number: int) -> str:
     return next((str(item) for item in table.values() if isinstance(item, str)), str(number + 1))
 
 
-def _errors(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """A model's own estimate of its error, and its known error in words."""
-    error = answer.get("error_estimate")
+def error_words(error: Any) -> list[tuple[str, str]]:
+    """A model's own estimate of its error, where it has one, and its known error in words."""
     if not (isinstance(error, Mapping) and "statement" in error):
         return []
     known = ("known error", str(error["statement"]))
     if error["value"] is None:
         return [known]
-    return [("numerical error, no interval", f"{percent(error['value'])} of the forward velocity"), known]
+    against = error.get("against", "another resolution")
+    estimate = f"{percent(error['value'])} of the forward velocity, against {against}"
+    return [("numerical error, no interval", estimate), known]

@@ -31,7 +31,7 @@ from spirillum.cli.tables.parts import (
     series_rows,
     unsteady,
 )
-from spirillum.display import fitted_words, percent, rows_of, times
+from spirillum.display import error_words, fitted_words, rows_of, times
 from spirillum.dynamics.run_summary import merged_events
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
@@ -132,12 +132,8 @@ def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         if item["answered"]:
             if "trial" in item:
                 yield from released_columns({"trial": item["trial"]})
-            error = item["error_estimate"]
-            estimate = ""
-            if error["value"] is not None:
-                against = error.get("against", "another resolution")
-                estimate = f"{percent(error['value'])} of the forward velocity, against {against}; "
-            yield Detail(f"known error of {item['model']}: {estimate}{error['statement']}")
+            errors = "; ".join(text for _, text in error_words(item["error_estimate"]))
+            yield Detail(f"known error of {item['model']}: {errors}")
         else:
             yield f"no answer by {item['model']}: {item['reason']}"
     yield from files_of(answer, file="picture", plot="why models differ")

@@ -9,7 +9,7 @@ from rich.box import SIMPLE_HEAVY
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.display import percent, rows_of
+from spirillum.display import error_words, percent, rows_of
 from spirillum.notes import notes_in_answer
 from spirillum.units import display_unit, in_unit, speed_unit
 
@@ -238,8 +238,4 @@ def reason_of(answer: Answer) -> Iterator[Detail]:
 
 def error_of(error: Answer) -> Iterator[Detail]:
     """A model's own estimate, where it has one, and its known error in words."""
-    if error["value"] is not None:
-        against = error.get("against", "another resolution")
-        share = percent(error["value"])
-        yield Detail(f"numerical error, no interval: {share} of the forward velocity, against {against}")
-    yield Detail(f"known error: {error['statement']}")
+    return (Detail(f"{name}: {text}") for name, text in error_words(error))
