@@ -66,19 +66,24 @@ def imap_unordered(
                 yield task, future.result()
             del done, future  # they hold the answers
         pool.shutdown()
-    except BrokenProcessPool as error:
-        raise InputError(
-            f"a process of {workers} was ended from outside, as for want of memory; allowed: workers = 1, or more "
-            f"memory{besides}"
-        ) from error
-    except BaseException:
-        for process in multiprocessing.active_children():
-            process.terminate()  # what they were at is lost, what was answered is not
+    except BaseException as error:
+        _give_up(pool, multiprocessing.active_children())  # what was answered is not lost
+        if isinstance(error, BrokenProcessPool):
+            raise InputError(
+                f"a process of {workers} was ended from outside, as for want of memory; allowed: workers = 1, or more "
+                f"memory{besides}"
+            ) from error
         raise
-    finally:
-        # Waited for, as none of them is at work any more: the library's thread of a pool may close its pipe at the
-        # very moment in which the end of the interpreter writes to it.
-        pool.shutdown(cancel_futures=True)
+
+
+def _give_up(pool: ProcessPoolExecutor, processes: Iterable[multiprocessing.process.BaseProcess]) -> None:
+    """End a pool and its processes, whatever they are at."""
+    thread = getattr(pool, "_executor_manager_thread", None)
+    pool.shutdown(wait=False, cancel_futures=True)  # first: its thread fails at tasks that are cancelled later
+    for process in processes:
+        process.terminate()
+    if thread is not None:  # else it may close its pipe while the end of the interpreter writes to it
+        thread.join()
 
 
 @contextmanager
@@ -95,9 +100,7 @@ def process_beside(start: Callable[[], object]) -> Iterator[ProcessPoolExecutor 
             pool.submit(start)
         yield pool
     finally:
-        for process in set(multiprocessing.active_children()) - before:
-            process.terminate()
-        pool.shutdown(cancel_futures=True)
+        _give_up(pool, set(multiprocessing.active_children()) - before)
 
 
 BUSY = 1.5  #: Slowdown by other work from which on a machine counts as busy.

@@ -18,6 +18,7 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports and figures have tests of their own, and take most of the time."""
     monkeypatch.setattr("spirillum.results.study.write_report", lambda *_, **__: None)
     monkeypatch.setattr("spirillum.view.figures.calibration.calibration_drawings", lambda _: {})
+    monkeypatch.setattr("spirillum.worker_pool.BUSY", 0.0)  # no second process, which takes none of these
 
 
 @pytest.mark.usefixtures("plain")

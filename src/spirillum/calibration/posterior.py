@@ -143,7 +143,7 @@ def _finished(
     theirs: Future[tuple[_Ensemble, Samples]] | None, sampler: _Ensemble, steps: int, warm_up: int
 ) -> tuple[_Ensemble, Samples]:
     """An ensemble after its steps, from the process beside this one where that has begun it; and the steps."""
-    if theirs is not None and not theirs.cancel():
+    if theirs is not None:
         with suppress(BrokenProcessPool):  # ended from outside
             return theirs.result()
     return _advanced(sampler, steps, warm_up)
