@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube
 from spirillum.errors import InputError
+from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import core
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
@@ -225,7 +226,7 @@ def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
     for around in (
         Surroundings(),
         Surroundings(ends=core.OPEN, length=1e9),
-        Surroundings(ends=core.OPEN, length=0),
+        Surroundings(ends=core.OPEN, length=0.0),
     ):
         _, links, _ = made(around)
         state = state_at_release(made()[0].robot, links, *at(gap=5e-4))
@@ -533,8 +534,12 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: 1.0)  # the stand-in holds at any yaw and gap
     monkeypatch.setattr(tube_simulation, "least_checked_gap", lambda _: 0.0)
     steady, links, _ = made()
-    table = SimpleNamespace(
-        packed=links.table, speed_error_at=lambda yaw: 0.02 if yaw else 0.01, key="name", error_against="solutions"
+    table = mock.Mock(
+        spec=TubeTable,
+        packed=links.table,
+        speed_error_at=lambda yaw: 0.02 if yaw else 0.01,
+        key="name",
+        error_against="solutions",
     )
     file = tmp_path / "flow.csv"
     file.write_text("# pulsating\ntime_s,flow_mm_s\n0,0\n1,2\n2,-1\n")

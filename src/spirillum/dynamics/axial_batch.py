@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -230,9 +230,9 @@ class AxialBatch:
         self,
         dt: float,
         *,
-        duty: Samples | float | None = None,
-        remote: np.ndarray | bool | None = None,
-        flow: Samples | float | None = None,
+        duty: Samples | Sequence[float] | float | None = None,
+        remote: np.ndarray | Sequence[bool] | bool | None = None,
+        flow: Samples | Sequence[float] | float | None = None,
     ) -> None:
         """Advance all by a time; what is not given stays as it was.
 
@@ -302,7 +302,7 @@ class AxialBatch:
             f"{name} = {clipped(given)}; allowed: True or False, one for all or one for each of {self.count} robots"
         )
 
-    def _one_each(self, name: str, given: Samples | float, low: float, high: float) -> Samples:
+    def _one_each(self, name: str, given: Any, low: float, high: float) -> Samples:
         try:
             values = np.array(np.broadcast_to(np.asarray(given, dtype=np.float64), (self.count,)))
         except (TypeError, ValueError, OverflowError) as error:

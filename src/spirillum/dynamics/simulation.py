@@ -48,7 +48,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     motion: str | None = None,
     friction: str | None = None,
     calibrated: bool = True,
-    calibration: str | Path | None = None,
+    calibration: str | Path | Fit | None = None,
     posterior: str | Path | None = None,
     draws: int | None = None,
     timing: Timing | Mapping[str, Any] | None = None,
