@@ -81,4 +81,6 @@ from .virtual.experiment import virtual_experiment as virtual_experiment
 from .virtual.live_camera import VirtualCamera as VirtualCamera
 from .virtual.trial import render as render
 
+HeldPlants = AxialBatch  # deprecated
+
 __version__: str

@@ -27,7 +27,6 @@ from spirillum.robot.fields import Section, field_values
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.motions import STEADY
 from spirillum.swimming.prediction import predict_steady
 from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import swim
@@ -252,7 +251,7 @@ def _swimming(robot: Robot, model: str, point: CasePoint, is_nominal: bool) -> d
         swum = swim(RobotBatch.of(robot, Placement.of(point.placement)), model)
         if not swum.valid[0]:
             raise InputError(f"{robot.name}: model {model!r} has no answer under an assumption of its case")
-    values = {item.name: abs(float(getattr(swum, item.name)[0])) for item in STEADY}
+    values = {name: abs(float(column[0])) for name, column in swum.quantities.items()}
     stated = error if math.isfinite(error) else None
     return {name: CaseValue(value, stated if name in _OF_SPEED else None) for name, value in values.items()}
 

@@ -27,12 +27,13 @@ from spirillum.fluid.tube.domain import WIRE_FILM, in_tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
+from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
-from spirillum.swimming.motions import STEADY, Swimming
+from spirillum.swimming.motions import Swimming
 from spirillum.swimming.preparation import has_table, preparation_time, why_no_table
 from spirillum.swimming.steady import one_after_another
 from spirillum.units import show
@@ -82,7 +83,9 @@ class Band:
     def to_dict(self) -> dict[str, Any]:
         """All poses with their answers, as quantities whose values are lists."""
         found = {"gap": quantity(self.gap, "m"), "pitch": quantity(self.pitch, "rad")}
-        return found | {item.name: quantity(getattr(self.swimming, item.name), item.unit) for item in STEADY}
+        return found | {
+            name: quantity(column, QUANTITIES[name].unit) for name, column in self.swimming.quantities.items()
+        }
 
 
 def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ from spirillum.swimming.balance import (
     run_time,
     steady_current,
 )
-from spirillum.swimming.motions import LEVEL, STEADY, Intervals, Swimming
+from spirillum.swimming.motions import LEVEL, Intervals, Swimming
 from spirillum.swimming.sampled_resistance import AxialTable, TubeResistance, chebyshev_points
 from spirillum.swimming.steady import KnownResistance, swim_on_floor
 
@@ -232,7 +232,7 @@ def _with_discrepancy(
     swum: Swimming, batch: RobotBatch, off: Mapping[str, Samples], *, own_drive: bool, friction: str, observed: bool
 ) -> dict[str, Samples]:
     """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
-    values = {item.name: getattr(swum, item.name) for item in STEADY}
+    values: dict[str, Samples] = swum.quantities
     one = np.ones(swum.forward_velocity.size)
 
     advance, turning, motor = off["advance"], off["turning"], off["motor_rate"]

@@ -64,9 +64,14 @@ class Swimming(DisplayMixin):
     valid: Flags
     warnings: tuple[Note, ...] = ()  #: Of the whole batch.
 
+    @property
+    def quantities(self) -> dict[str, PerRobot]:
+        """The arrays of the quantities by name, without `valid` and `warnings`."""
+        return {item.name: getattr(self, item.name) for item in STEADY}
+
     def to_dict(self) -> dict[str, Any]:
         """Median, least and largest of every quantity over the robots, as data."""
-        found = {item.name: np.asarray(getattr(self, item.name))[self.valid] for item in STEADY}
+        found = {name: np.asarray(column)[self.valid] for name, column in self.quantities.items()}
         known = {name: column[np.isfinite(column)] for name, column in found.items()}
         content = {
             "robots": int(self.valid.size),
