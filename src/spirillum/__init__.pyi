@@ -32,8 +32,8 @@ from .exports.write import export as export
 from .fields.flow import Flow as Flow
 from .fields.flow import flow as flow
 from .fluid.model import SwimmerModel as SwimmerModel
-from .fluid.resistance import Resistance as Resistance
-from .fluid.resistance import resistance as resistance
+from .fluid.registry import Resistance as Resistance
+from .fluid.registry import resistance as resistance
 from .interfaces.bench import Bench as Bench
 from .interfaces.python_control import LinearSystem as LinearSystem
 from .interfaces.python_control import control_system as control_system

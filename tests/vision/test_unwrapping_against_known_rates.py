@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.fluid.resistance import resistance
+from spirillum.fluid.registry import resistance
 from spirillum.robot.load import load
 from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup, stripes_of
 from spirillum.vision.track.colours import pattern_period

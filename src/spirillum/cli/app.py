@@ -137,7 +137,7 @@ def compare_models(
 
 
 @from_function(
-    "spirillum.fluid.resistance:resistance",
+    "spirillum.fluid.registry:resistance",
     without={
         **NO_FORM,
         "resolution.phases": "the matrix is that of one phase",

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.reference_errors import CHECKED, tail_error
-from spirillum.fluid.resistance import resistance
+from spirillum.fluid.registry import resistance
 from spirillum.papers.caldag2019.released import released_motion
 from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
