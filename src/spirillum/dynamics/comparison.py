@@ -13,7 +13,6 @@ import numpy as np
 
 from spirillum.arrays import Axial, PerRobot
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.release import InTube
 from spirillum.dynamics.trial import TrialRequest
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice
@@ -284,12 +283,7 @@ def compare_models(
         friction=reading,
         calibrated=factors,
         fit=fit,
-        resolution=None,
         placement=pose,
-        roughness=None,
-        in_tube=InTube(),
-        duration=None,
-        interval=False,
         progress=progress,
     )
     predictions: dict[str, Prediction] = {}

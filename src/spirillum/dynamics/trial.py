@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -29,6 +29,7 @@ from spirillum.envelope import quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.kernels.native import thread_count
 from spirillum.notes import Note, notes_in
 from spirillum.progress import Progress, tell
@@ -72,7 +73,7 @@ def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, ba
         return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
     if has_table(batch, "yaw"):
         return ""
-    return why_no_table(batch) or (
+    return why_no_table(*in_tube(batch)) or (
         "its tube has no table with yawed poses yet; `spirillum prepare` makes it in "
         f"{preparation_time(batch, 'yaw')}, `simulate` and `settle` too"
     )
@@ -296,13 +297,13 @@ class TrialRequest:
     friction: str | None
     calibrated: bool
     fit: Fit
-    resolution: Resolution | Mapping[str, Any] | None
     placement: Placement | Mapping[str, Any] | None
-    roughness: str | float | None
-    in_tube: InTube
-    duration: float | None  #: Of the trial, s; None: that of a run by its defaults.
-    interval: bool
     progress: Progress | None
+    resolution: Resolution | Mapping[str, Any] | None = None
+    roughness: str | float | None = None
+    in_tube: InTube = field(default_factory=InTube)
+    duration: float | None = None  #: Of the trial, s; None: that of a run by its defaults.
+    interval: bool = False
     posterior_for: PosteriorFor = "new"  #: Whose discrepancy the interval holds, with a posterior.
 
     def check(self, model: str, tail_rate: str | float | None, *, wanted: bool) -> None:

@@ -33,7 +33,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.prediction import Prediction, free_in_tube
-from spirillum.swimming.preparation import check_domain, table_for
+from spirillum.swimming.preparation import check_domain, check_usual_resolution, table_for
 from spirillum.swimming.scenario import NO_WEIGHT
 from spirillum.units import show, show_height
 
@@ -206,6 +206,7 @@ def table_of_run(robot: Robot, release: Release, progress: Progress | None) -> T
 def check_in_tube(robot: Robot, release: Release) -> None:
     """Refuse requests that a run in a tube does not support, before minutes go into a table."""
     placed, options, roughness, _ = release
+    check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
             f"placement.tail_drop = {show(placed.tail_drop, 'mm')} has no effect in a free run; allowed: 0 mm"

@@ -35,7 +35,7 @@ _SAME = 1e-6  # relative difference up to which two geometries are the same
 _Word = Annotated[Text, Field(max_length=500)]
 
 
-def _fitted_model(name: str) -> str:
+def fitted_model(name: str) -> str:
     """The name of a model that may have been fitted, or none."""
     if name and name not in SWIMMER_MODELS:
         raise ValueError(f"a model that swims: {', '.join(SWIMMER_MODELS)}")
@@ -93,7 +93,7 @@ class Provenance(Section):
     sha256: _Word = ""  #: Hash of that file.
     rows: Annotated[int, Field(strict=True, ge=0)] = 0  #: Rows that were used.
     robots: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()  #: Robots that the rows belong to.
-    model: Annotated[_Word, AfterValidator(_fitted_model)] = ""  #: Hydrodynamic model that was fitted.
+    model: Annotated[_Word, AfterValidator(fitted_model)] = ""  #: Hydrodynamic model that was fitted.
     method: _Word = ""  #: Method of the fit.
     free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()  #: Parameters that were free.
     answer: Literal["held", "trial"] = "held"  #: Motion that was fitted.

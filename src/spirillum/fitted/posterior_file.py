@@ -22,10 +22,10 @@ from spirillum.fitted.calibration_file import (
     FittedFriction,
     FittedValues,
     calibrated_robot,
+    fitted_model,
     friction_of_tails,
     nearest_channel,
 )
-from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.model_options import Calibration, FittedTo
 from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.robot.robot import Robot
@@ -46,12 +46,6 @@ _Length = Annotated[float, Field(gt=1e-9, lt=1e3)]
 _Number = Annotated[float, Field(gt=-1e12, lt=1e12)]
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
 _Names = Annotated[str, Field(max_length=10_000)]
-
-
-def _fitted_model(name: str) -> str:
-    if name not in SWIMMER_MODELS:
-        raise ValueError("a model that swims: " + ", ".join(SWIMMER_MODELS))
-    return name
 
 
 class _Table(BaseModel):
@@ -113,7 +107,7 @@ class _Robot(_Table):
 class _Fitted(_Table):
     """Model, robots and observations of a posterior."""
 
-    model: Annotated[str, AfterValidator(_fitted_model)]
+    model: Annotated[str, Field(min_length=1), AfterValidator(fitted_model)]
     observations: _Names
     synthetic: bool
     channels: Annotated[tuple[_Length, ...], Field(min_length=1, max_length=1000)]

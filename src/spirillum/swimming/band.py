@@ -192,7 +192,7 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
         return []
     named = f"{' and '.join(over)} {'is' if len(over) == 1 else 'are'}"
     more = "--band gives the band over them, in minutes"
-    if not has_table(batch) and not why_no_table(batch):
+    if not has_table(batch) and not why_no_table(*in_tube(batch)):
         whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
         band = band.partition(" on ")[0]
         more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"

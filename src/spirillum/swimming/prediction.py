@@ -18,6 +18,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import fit_clause
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
+from spirillum.fluid.tube.domain import in_tube
 from spirillum.fluid.tube.progress_messages import LEVEL, TILTED, solution_message
 from spirillum.kernels.native import run_together
 from spirillum.notes import Note
@@ -218,7 +219,7 @@ def predict_steady(
     if not chosen.closed_form:
         direct, tilted = chosen.form == "direct", bool(batch.placement.pitch or batch.placement.yaw)
         if direct and not tilted:
-            instead = "" if why_no_table(batch) else "; `spirillum prepare` makes further answers immediate"
+            instead = "" if why_no_table(*in_tube(batch)) else "; `spirillum prepare` makes further answers immediate"
             tell(progress, f"{solution_message(LEVEL)}{instead}", 0, 1)
         tell(progress, solution_message(TILTED) if direct and tilted else chosen.name, 0, 1)
     result, error, notes = scenario.solved()

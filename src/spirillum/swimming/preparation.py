@@ -314,21 +314,16 @@ def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeome
     """Return what decides the tables that robots of a batch lack in their tubes, each once."""
     fits = all_hold(TabledTube({}).requirements(batch))
     every = [in_tube(batch, index) for index in np.flatnonzero(fits).tolist()]
-    return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and not _why_no_table(*one)]
+    return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and not why_no_table(*one)]
 
 
-def _why_no_table(geometry: RobotGeometry, radius: float) -> str:
-    """Why there can be no table, as of a tail wider than its body; empty where there can be one."""
+def why_no_table(geometry: RobotGeometry, radius: float) -> str:
+    """Why a robot can have no table in its tube, as one with a tail wider than its body; empty where it can."""
     try:
         _ = Places(geometry, radius).gaps
     except InputError as error:
         return str(error)
     return ""
-
-
-def why_no_table(batch: RobotBatch) -> str:
-    """Why the first robot of a batch can have no table in its tube; empty where it can."""
-    return _why_no_table(*in_tube(batch))
 
 
 def preparation_time(batch: RobotBatch, stage: StageName) -> str:
