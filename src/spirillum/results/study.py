@@ -20,6 +20,7 @@ import xarray as xr
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import check_replaceable, guard_inputs, output_folder, results_folder, write_dataset, write_text
+from spirillum.files.writing import Replace
 from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
 from spirillum.papers.claim import PredictedVerdict, Verdict
@@ -33,7 +34,7 @@ from spirillum.robot.fields import Section
 from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import Drive, Motor
-from spirillum.studies.dataset import read_dataset
+from spirillum.studies.dataset import is_dataset, read_dataset
 from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit_of_ranked
 from spirillum.studies.run import computed_study, make_tables, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
@@ -254,10 +255,11 @@ def study(  # noqa: PLR0913 - the options of the command
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         with process_beside(partial(load_figures, *_DRAWING)) if figures and workers != 1 else nullcontext() as beside:
             if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
-                check_replaceable(folder / "dataset.nc")
+                replace: Replace = "any" if is_dataset(folder / "dataset.nc") else "own"
+                check_replaceable(folder / "dataset.nc", replace)
                 parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
                 dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
-                write_dataset(dataset, folder / "dataset.nc")
+                write_dataset(dataset, folder / "dataset.nc", replace=replace)
                 shutil.rmtree(parts, ignore_errors=True)
             if figures:
                 write_report(dataset, folder, on_progress, vector=vector, beside=beside)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Flags, Values
 from spirillum.errors import InputError
-from spirillum.files import loaded_netcdf
+from spirillum.files import loaded_netcdf, open_netcdf
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
@@ -298,6 +299,13 @@ def read_dataset(path: Path, robots: int) -> xr.Dataset | None:
     except InputError:
         return None
     return found if found.attrs.get("checksum") == checksum_of(found) else None
+
+
+def is_dataset(path: Path) -> bool:
+    """Whether a file is the dataset of a study, also one that was changed since it was written."""
+    with suppress(InputError), open_netcdf(path, "a dataset of this study") as file:
+        return "fingerprint" in file.attrs
+    return False
 
 
 class Caution(NamedTuple):
