@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from spirillum.swimming.steady import swim
 from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
 
-WIDE = "biorob2012-wide"
+WIDE, LONG = "biorob2012-wide", "x" * 5000
 FUNCTIONS = [name for name in sp.__all__ if inspect.isfunction(getattr(sp, name)) and name != "citation"]
 OF_A_KIND: dict[str, Any] = {
     "str": "text",
@@ -193,3 +194,23 @@ def test_public_functions_can_be_sent_to_another_process() -> None:
 def test_rates_have_to_be_numbers(name: str, wrong: Any) -> None:
     with pytest.raises(sp.InputError, match=rf"{name} = .*; allowed: numbers in rad/s"):
         swim(sp.RobotBatch.of(sp.load("biorob2012-wide")), **{name: wrong})
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sp.calibrate("", WIDE), "an empty name, or '.', is a folder; allowed: an observations file"),
+        (lambda: sp.study(""), "an empty name, or '.', is a folder; allowed: a study file"),
+        (lambda: sp.predict(WIDE, posterior=""), "an empty name, or '.', is a folder; allowed: posterior.nc"),
+        (lambda: sp.study({"robots": [LONG]}), "is not allowed; allowed: at most 200 characters"),
+        (lambda: sp.study({"robots": [""]}), "robots.0 = '' is not allowed; allowed: text that is not empty"),
+        (lambda: sp.predict(WIDE, model=LONG), "xxx'; allowed: auto, sbt"),
+        (lambda: sp.predict(WIDE, friction=LONG), "xxx'; allowed: none, rotor"),
+        (lambda: sp.study({"robots": [WIDE], "models": [LONG]}), "; allowed: auto, sbt"),
+    ],
+)
+def test_empty_and_long_names_are_told_what_is_allowed(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises(sp.InputError) as caught:
+        call()
+    assert words in str(caught.value)
+    assert len(str(caught.value)) < 810

@@ -40,9 +40,9 @@ def led_by(source: str) -> Iterator[None]:
 
 
 def _one_line(text: str) -> str:
-    """The text in one printable line, whatever a user's file put into it."""
-    line = "".join(c if c.isprintable() else "?" for c in " ".join(text[:_LONGEST].split()))
-    return line if len(text) <= _LONGEST else f"{line}…"
+    """The text in one printable line, whatever a user's file put into it; a long one keeps its end, what is allowed."""
+    text = text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}"
+    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
 
 
 def failure_sentence(error: BaseException) -> str:

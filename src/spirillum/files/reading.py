@@ -125,6 +125,8 @@ def _at_once(name: str, flags: int) -> int:
 def _refused(path: Path, error: OSError, what: str) -> InputError:
     if isinstance(error, FileNotFoundError):
         return InputError(f"{path} does not exist; allowed: {what}")
+    if str(path) == ".":  # what an empty name becomes
+        return InputError(f"an empty name, or '.', is a folder; allowed: {what}")
     if isinstance(error, IsADirectoryError) or path.is_dir():
         return InputError(f"{path} is a folder; allowed: {what}")
     if error.errno == errno.ENXIO:  # a socket

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.answer_entries import answer_of
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.errors import InputError, check_choice, did_you_mean
+from spirillum.errors import InputError, check_choice
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.closed.perrin import Perrin
 from spirillum.fluid.closed.rft import Rft
@@ -43,9 +43,7 @@ def find_model(name: str) -> ResistanceModel:
 
 def find_swimmer_model(name: str, *more: str) -> SwimmerModel:
     """The model of that name that makes a robot swim."""
-    if str(name) not in SWIMMER_MODELS:
-        allowed = [*more, *SWIMMER_MODELS]
-        raise InputError(f"model = {name!r}{did_you_mean(str(name), allowed)}; allowed: {', '.join(allowed)}")
+    check_choice("model", str(name), (*more, *SWIMMER_MODELS))
     return SWIMMER_MODELS[name]
 
 

@@ -275,6 +275,7 @@ def _refused(problem: Mapping[str, Any], field: str, bounds: str = "") -> str:
 def _allowed(problem: Mapping[str, Any], field: str) -> str:
     """Allowed values, for the kinds of errors that name no fields."""
     kind, context = problem["type"], problem.get("ctx", {})
+    kind = f"string_{kind}" if kind in ("too_long", "too_short") and isinstance(problem.get("input"), str) else kind
     words = {
         "model_type": f"a [{field}] table",
         "tuple_type": "a list, [...]",

@@ -24,7 +24,7 @@ from typing import NamedTuple, cast, get_args
 import numpy as np
 
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, Matrix12, PerRobot, Samples, Values
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.kernels.core import MOST_POINTS, MOTOR_SIZE, curve_torques, steady_currents, windings
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.tables import FrictionModel, TorqueCurve
@@ -176,8 +176,7 @@ def _determinant(s: TorqueBalance, t: FrictionTorques) -> Values:
 
 def find_friction_model(name: str) -> FrictionModel:
     """Return the friction model of that name."""
-    if name not in get_args(FrictionModel):
-        raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionModel))}")
+    check_choice("friction", name, get_args(FrictionModel))
     return cast("FrictionModel", name)
 
 
