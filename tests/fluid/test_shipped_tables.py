@@ -202,3 +202,13 @@ def test_nose_down_nothing_is_said_beyond_the_last_node() -> None:
     assert left == TOO_FAR_PITCHED
     assert sp.predict("biorob2012-wide", placement={"gap": "0.72 mm", "pitch": "-8 deg"}).model.form == "table"
     assert np.isfinite(last).all()
+
+
+def test_a_robot_of_another_size_is_told_from_that_of_a_table() -> None:
+    """The table of a prediction answers for its tail in its tube, at any viscosity."""
+    robot = sp.load("biorob2012-wide")
+    held, one = sp.predict(robot, motion="held", band=False), sp.RobotBatch.of(robot)
+    thin = sp.swim(one.with_values({"fluid.viscosity": [1.0, robot.fluid.viscosity]}), held.model)
+    assert thin.forward_velocity[1] == held.forward_velocity < thin.forward_velocity[0]
+    with pytest.raises(sp.InputError, match=r"robot 1 \(tail 20 x 2.5 mm\) is not the one whose table answers"):
+        sp.swim(one.with_values({"tail.wavelength": [robot.tail.wavelength, 0.02]}), held.model)

@@ -164,7 +164,17 @@ class TabledTube(Tube):
 
     def table_of(self, batch: RobotBatch, index: int = 0) -> TubeTable:
         """The table of one robot."""
-        return self._tables[key_of(*in_tube(batch, index))]
+        return self._table(batch, index, *in_tube(batch, index))
+
+    def _table(self, batch: RobotBatch, index: int, geometry: RobotGeometry, radius: float) -> TubeTable:
+        found = self._tables.get(key_of(geometry, radius))
+        if found is None:
+            tail = f"{1e3 * number_of(batch.wavelength, index):g} x {1e3 * number_of(batch.amplitude, index):g} mm"
+            raise InputError(
+                f"robot {index} (tail {tail}) is not the one whose table answers; allowed: robots of its size in its "
+                "tube, or model 'tube' by name, which solves for each"
+            )
+        return found
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """None: the error of a table is stored, see `stated_speed_error`."""
@@ -206,7 +216,7 @@ class TabledTube(Tube):
         found = np.full((batch.size, 5, 5), np.nan)
         for index in within(batch, self.domain(batch)):
             (geometry, pose), mean = seated(batch, index), np.empty((MOTIONS, MOTIONS))
-            table = self._tables[key_of(geometry, pose.radius)]
+            table = self._table(batch, index, geometry, pose.radius)
             mean_resistance_at(table.packed, pose.offset, pose.pitch, pose.yaw, PHASES, mean)
             axes = along_the_tube(np.array(pose.pitch), np.array(pose.yaw))
             found[index] = 0.0
