@@ -38,14 +38,14 @@ def test_tables_and_json_say_the_same(run: Callable[..., Any], tmp_path: Path) -
     assert answer["schema"] == "spirillum.settling/1"
     assert answer["file"] is None
     assert f"model tube: {answer['model_reason']}" in tables.out
-    assert answer["lying"]["state"] == "steady"
-    gap = answer["lying"]["gap"]
+    assert answer["steady_state"]["state"] == "steady"
+    gap = answer["steady_state"]["gap"]
     assert gap["low"] <= gap["value"] <= gap["high"]
     assert f"{answer['drainage_time']['value']:.4g}" in tables.out
     assert "in transit, as the gap first falls to 0.2 mm" in tables.out
     assert "(mean over a turn of the tail, at least " in tables.out
     assert "found from the run at" in tables.out
-    way = answer["way"]
+    way = answer["trajectory"]
     assert len(way["time"]["value"]) == len(way["gap"]["value"]) <= 400
     assert answer["film"]["gap"]["value"] == pytest.approx([5e-4, 3.976e-4, 3.162e-4, 2.515e-4, 2e-4], rel=1e-3)
 
@@ -56,7 +56,7 @@ def test_prediction_says_where_it_lies(run: Callable[..., Any], wall: tuple[str,
     outcome = run("predict", WIDE, "--model", "tube", "--motion", "free", *wall, *QUICK[2:], "--json")
     answer = json.loads(outcome.out)
     assert answer["motion"] == "free"
-    assert answer["lying"]["state"] == "steady"
+    assert answer["steady_state"]["state"] == "steady"
     assert 0 < answer["forward_velocity"]["value"] < 4e-4
     assert answer["placement"]["gap"]["value"] == pytest.approx(5e-4)
     said = answer["other_models"]["statement"]
@@ -76,7 +76,7 @@ def test_first_line_says_that_no_steady_motion_was_reached(
     assert "numerical error" not in tables.out
     assert "times this speed" not in tables.out
     answer = json.loads(run(*asked, "--json").out)
-    assert answer["lying"]["statement"] == first
+    assert answer["steady_state"]["statement"] == first
     assert answer["error_estimate"]["value"] is None
     assert run("settle", WIDE, *asked[4:]).out.startswith(first)
 

@@ -43,7 +43,7 @@ def settled() -> Any:
 def test_simulation_laid_down_at_the_steady_place_stays_there() -> None:
     """Within the ripple of the tail's phase: speed and body rate to 1 %, azimuth and yaw to 0.1 degrees."""
     motion = found().prediction
-    lying = motion.lying
+    lying = motion.steady_state
     assert lying is not None
     assert lying.state == "steady"
     place = {"gap": lying.gap, "pitch": lying.pitch, "yaw": lying.yaw}
@@ -134,16 +134,16 @@ def test_predict_settle_and_the_engine_say_the_same() -> None:
     answer = settled()
     motion = found()
     assert answer.prediction.forward_velocity == pytest.approx(motion.prediction.forward_velocity, rel=1e-9)
-    assert answer.lying == motion.run.lying
-    gap, time = answer.way("gap"), answer.way("time")
+    assert answer.steady_state == motion.run.lying
+    gap, time = answer.trajectory("gap"), answer.trajectory("time")
     assert np.interp(answer.drainage_time, time, gap) == pytest.approx(2e-4, rel=1e-2)
     run = sp.simulate(robot(), timing={"duration": "3 s"}, roughness=ROUGH, in_tube={"wait": 0.0})
     step = int(np.argmin(np.abs(time - answer.drainage_time)))
     for name, ours in (("wall_gap", "gap"), ("azimuth", "azimuth"), ("wall_pitch", "pitch"), ("wall_yaw", "yaw")):
         theirs = float(np.interp(time[step], run["time"], run[name]))
-        assert float(answer.way(ours)[step]) == pytest.approx(theirs, rel=0.01), name
+        assert float(answer.trajectory(ours)[step]) == pytest.approx(theirs, rel=0.01), name
     content = answer.to_dict()
-    assert content["lying"]["azimuth"]["value"] == motion.run.lying.azimuth
+    assert content["steady_state"]["azimuth"]["value"] == motion.run.lying.azimuth
     assert content["drainage_time"]["until"]["value"] == 2e-4
 
 

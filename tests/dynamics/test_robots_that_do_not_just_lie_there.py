@@ -42,7 +42,7 @@ def test_a_motion_that_cannot_be_followed_ends_with_a_state(most: int, monkeypat
     monkeypatch.setattr(return_map, "_MOST_STEPS", most)
     found = sp.settle(sp.load("biorob2012-wide", **{"body.mass": "7.9 g"}), placement={"gap": "0.2 mm"})
     assert found.to_dict()["state"] == "changing"
-    assert "steps are too short to follow it on" in found.lying.ended
+    assert "steps are too short to follow it on" in found.steady_state.ended
     assert np.isfinite(found.prediction.forward_velocity)
 
 

@@ -50,8 +50,8 @@ def test_the_steady_column_is_what_settle_finds(driven: sp.Robot, answer: Any) -
     found = sp.settle(driven)
     for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "drive_torque"):
         assert answer.steady.values[name] == pytest.approx(getattr(found.prediction, name), rel=1e-9)
-    assert answer.steady.basis["time_constant"]["value"] == pytest.approx(found.lying.approach_time, rel=1e-9)
-    assert (answer.steady.basis["state"], answer.steady.values["gap"]) == ("steady", found.lying.gap)
+    assert answer.steady.basis["time_constant"]["value"] == pytest.approx(found.steady_state.approach_time, rel=1e-9)
+    assert (answer.steady.basis["state"], answer.steady.values["gap"]) == ("steady", found.steady_state.gap)
 
 
 def test_the_held_answer_stays_the_headline(driven: sp.Robot, answer: Any) -> None:

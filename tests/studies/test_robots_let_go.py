@@ -46,8 +46,8 @@ def test_each_robot_answers_as_alone(let_go) -> None:
     alone = free_motion(robot, roughness="20 um", in_tube={"friction_coefficient": 0.0}).prediction
     for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"):
         assert float(here[f"{name}_settled"]) == pytest.approx(getattr(alone, name), rel=1e-9)
-    assert float(here["gap_settled"]) == pytest.approx(alone.lying.gap, rel=1e-9)
-    assert SETTLED_STATES[int(here["settled"])] == alone.lying.state
+    assert float(here["gap_settled"]) == pytest.approx(alone.steady_state.gap, rel=1e-9)
+    assert SETTLED_STATES[int(here["settled"])] == alone.steady_state.state
 
 
 def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:

@@ -209,7 +209,7 @@ _LIGHT = 1e-9  # Weight in the fluid, over the forces that act, below which a ro
 class FreeMotion(NamedTuple):
     """A free robot in its tube, followed to its steady motion."""
 
-    prediction: Prediction  #: The steady motion; its pose is `prediction.lying`.
+    prediction: Prediction  #: The steady motion; its pose is `prediction.steady_state`.
     run: LongRun  #: How it came there.
     robot: TubeRobot  #: What its rates follow from.
     start_gap: float  #: Smallest distance between body and wall at release, m.
@@ -283,7 +283,7 @@ def free_motion(
     acts = friction_acts(held.friction, held.tail_rate)
     source = fit.source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
-    found = replace(found, lying=run.lying)
+    found = replace(found, steady_state=run.lying)
     return FreeMotion(found, run, links, gap, requested, checked)
 
 

@@ -51,8 +51,8 @@ def predict(  # noqa: PLR0913 - the options of the command
     the last two are computed where they are read. With `motion="held"` it has the first alone.
 
     With `motion="free"` and the model `tube` the robot is followed in its tube from the placement to its steady motion,
-    with weight, film and contact (`spirillum.settle` returns the path). If it reaches none, `lying.statement` states
-    why. With a DC motor the current follows from (17) at the drive's duty, the effective friction from (18).
+    with weight, film and contact (`spirillum.settle` returns the path). If it reaches none, `steady_state.statement`
+    states why. With a DC motor the current follows from (17) at the drive's duty, the effective friction from (18).
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.

@@ -98,7 +98,7 @@ class Settling(DisplayMixin):
         return self.prediction.robot
 
     @property
-    def lying(self) -> SteadyState:
+    def steady_state(self) -> SteadyState:
         """The steady state."""
         return self._free.run.lying
 
@@ -123,7 +123,7 @@ class Settling(DisplayMixin):
         """Coefficient of dry friction."""
         return float(self._free.robot.tube[core.TUBE_COEFFICIENT])
 
-    def way(self, name: str) -> Samples:
+    def trajectory(self, name: str) -> Samples:
         """The time, gap, azimuth, pitch, yaw, contact_force, x or roll at every step of the run."""
         return self._free.run.path.of(name)
 
@@ -135,13 +135,13 @@ class Settling(DisplayMixin):
     @property
     def passing(self) -> dict[str, float]:
         """Azimuth, pitch and yaw (rad), and speed (m/s) and body rate (rad/s) over a turn, as it passes `until`."""
-        moment, time = self.drainage_time, self.way("time")
+        moment, time = self.drainage_time, self.trajectory("time")
         half = 0.5 * self._free.run.turn.time
         names = {"azimuth": "azimuth", "wall_pitch": "pitch", "wall_yaw": "yaw"}
-        found = {name: float(np.interp(moment, time, self.way(way))) for name, way in names.items()}
+        found = {name: float(np.interp(moment, time, self.trajectory(way))) for name, way in names.items()}
         ends = np.clip([moment - half, moment + half], time[0], time[-1])
         for name, way in (("forward_velocity", "x"), ("body_rotation_rate", "roll")):
-            found[name] = float(np.diff(np.interp(ends, time, self.way(way)))[0] / np.diff(ends)[0])
+            found[name] = float(np.diff(np.interp(ends, time, self.trajectory(way)))[0] / np.diff(ends)[0])
         return found if np.isfinite(moment) else dict.fromkeys(found, np.nan)
 
     @property
@@ -162,7 +162,7 @@ class Settling(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum settle --json`."""
-        count = self.way("time").size
+        count = self.trajectory("time").size
         shown = np.unique(np.linspace(0, count - 1, min(_SAMPLES, count)).astype(int))
         names = {name: name for name in ("time", "gap", "azimuth")} | {"wall_pitch": "pitch", "wall_yaw": "yaw"}
         names |= {"contact_force": "contact_force"}
@@ -174,8 +174,8 @@ class Settling(DisplayMixin):
         return answer_of(
             self,
             model_reason=IN_CHANNEL,
-            state=state_of(self.lying, self.warnings),
-            trajectory={name: self.way(way)[shown] for name, way in names.items()},
+            state=state_of(self.steady_state, self.warnings),
+            path={name: self.trajectory(way)[shown] for name, way in names.items()},
             film=film,
             error_estimate=self.prediction.to_dict()["error_estimate"],
         )

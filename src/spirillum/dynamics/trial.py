@@ -377,7 +377,7 @@ class TrialRequest:
             motion = free_motion(in_tube=still, fit=self.fit, **self._shared()).prediction
         except InputError as error:
             return ReleasedMotion(reason=str(error))
-        lying = motion.lying
+        lying = motion.steady_state
         assert lying is not None  # noqa: S101 - a free motion in the tube has one
         basis: dict[str, Any] = {
             "assumption": ASSUMPTION,

@@ -244,7 +244,7 @@ class SettledTask(OneRobot):
             in_tube={"friction_coefficient": self.contact.friction_coefficient},
         )
         found = motion.prediction
-        lying = found.lying
+        lying = found.steady_state
         assert lying is not None  # noqa: S101 - a free motion has one
         values = {"state": float(SETTLED_STATES.index(lying.state))}
         if lying.state == "changing":  # its means depend on when they are taken

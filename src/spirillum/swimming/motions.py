@@ -212,7 +212,7 @@ class SteadyState:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The object `lying` of an answer."""
+        """The object `steady_state` of an answer."""
         return content_of(self, over="a circuit" if self.state == "goes around" else "a turn of the tail")
 
 

@@ -67,7 +67,7 @@ class Prediction(DisplayMixin):
     """Band over the poses that the placement leaves open; None where there are none, or none was requested."""
     motion: Motion = "held"  #: Lateral motion and tilt constrained, or released.
     interval_of: str = ""  #: Whose the intervals are, in half a sentence; empty without a posterior.
-    lying: SteadyState | None = None
+    steady_state: SteadyState | None = None
     """Steady state of a free robot in its tube after its release (`placement`); None for others."""
     choice: ModelChoice | None = None  #: Reason of the model; None where it was named.
     tail_rate: float | None = None  #: Requested lab rate of the tail, rad/s; None: the robot's drive.
@@ -89,7 +89,7 @@ class Prediction(DisplayMixin):
     @property
     def known_error(self) -> str:
         """What the model leaves out of this robot, and what that costs it."""
-        if self.lying is not None:
+        if self.steady_state is not None:
             return free_in_tube(self.fitted_by)
         if self.model.placed and self.intervals is not None and self.band is None:
             return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
@@ -112,7 +112,7 @@ class Prediction(DisplayMixin):
     @cached_property
     def other_models(self) -> OtherModels | None:
         """Predictions of models that leave out effects which this one includes; None where none is comparable."""
-        if self.lying is not None and self.lying.state == "changing":
+        if self.steady_state is not None and self.steady_state.state == "changing":
             return None
         return other_models(
             self.robot,

@@ -27,8 +27,8 @@ def settling(state: str, slow: float = 65.0) -> Any:
         weight=0.028,
         roughness=1e-6,
         friction_coefficient=0.1,
-        lying=SimpleNamespace(state=state, gap=6e-7, azimuth=-0.1, pitch=0.001, yaw=-0.03, approach_time=slow),
-        way=WAY.__getitem__,
+        steady_state=SimpleNamespace(state=state, gap=6e-7, azimuth=-0.1, pitch=0.001, yaw=-0.03, approach_time=slow),
+        trajectory=WAY.__getitem__,
     )
 
 

@@ -53,7 +53,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     more = len(rows_of(answer)) - rows.row_count
     if more:
         yield f"and {more} more quantities: --all"
-    if "gap" in answer["placement"] and "lying" not in answer:
+    if "gap" in answer["placement"] and "steady_state" not in answer:
         yield _over_poses(answer, "held" if released else "value")
     if "trial" in answer:
         yield from released_columns(answer, "; its interval: --interval")
@@ -61,9 +61,9 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     for item in answer.get("published", ()):
         yield _compare_with_published(item)
     yield from files_of(answer, plot="plot")
-    yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
-    if "lying" in answer:
-        yield from resting_pose(answer["lying"])
+    yield from placement_of(answer["placement"], RELEASED if "steady_state" in answer else "placement")
+    if "steady_state" in answer:
+        yield from resting_pose(answer["steady_state"])
     yield from reason_of(answer)
     if "other_models" in answer:
         yield Detail(answer["other_models"]["statement"])
@@ -341,7 +341,7 @@ def settling(answer: Answer) -> Blocks:
         yield film
     yield from reason_of(answer)
     yield from placement_of(answer["placement"], RELEASED)
-    yield from resting_pose(answer["lying"])
+    yield from resting_pose(answer["steady_state"])
     yield from error_of(answer["error_estimate"])
     yield from files_of(answer, file="picture")
 

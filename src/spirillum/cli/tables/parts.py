@@ -189,17 +189,17 @@ RELEASED = "released at"  #: Head of the line on the placement of a robot that i
 
 def unsteady(answer: Answer) -> Iterator[str]:
     """Before all numbers, why a free robot has reached no steady motion; nothing where it has."""
-    if "lying" in answer and answer["lying"]["state"] != "steady":
-        yield answer["lying"]["statement"]
+    if "steady_state" in answer and answer["steady_state"]["state"] != "steady":
+        yield answer["steady_state"]["statement"]
 
 
-def resting_pose(lying: Answer) -> Iterator[str]:
+def resting_pose(steady: Answer) -> Iterator[str]:
     """Final motion of a free robot, and what it rests on; its pose on request."""
     from spirillum.swimming.motions import ASSUMPTION  # brings the models
 
-    yield f"{_STATES[lying['state']].format(time=in_words(lying['followed_time']))}; {ASSUMPTION}"
+    yield f"{_STATES[steady['state']].format(time=in_words(steady['followed_time']))}; {ASSUMPTION}"
     details = []
-    for name, item in lying.items():
+    for name, item in steady.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
             details.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
     yield Detail(f"there: {', '.join(details)}")

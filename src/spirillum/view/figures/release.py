@@ -43,15 +43,15 @@ def settling_figure(settling: Settling) -> Figure:
             notes=_notes(settling),
         )
         panels = sheet.panels[0]
-        time, lengths = settling.way("time"), UnitPrefix.of(settling.way("gap"), "m")
+        time, lengths = settling.trajectory("time"), UnitPrefix.of(settling.trajectory("gap"), "m")
         lines = ({"gap": "blue"}, {"azimuth": "vermillion"}, _TILTS)
         labels = (f"gap under the body ({lengths.unit})", "azimuth on the wall (deg)", "tilt against the wall (deg)")
         for axes, colours, label in zip(panels, lines, labels, strict=True):
             shown = lengths if "gap" in colours else np.rad2deg
             for name, colour in colours.items():
-                axes.plot(time, shown(settling.way(name)), color=COLOURS[colour], label=name)
-                if settling.lying.state == "steady":
-                    axes.axhline(float(shown(np.array(getattr(settling.lying, name)))), **_STEADY)
+                axes.plot(time, shown(settling.trajectory(name)), color=COLOURS[colour], label=name)
+                if settling.steady_state.state == "steady":
+                    axes.axhline(float(shown(np.array(getattr(settling.steady_state, name)))), **_STEADY)
             axes.set_xlim(0.0, time[-1])
             axes.set_xlabel("time (s)")
             axes.set_ylabel(label)
@@ -61,8 +61,8 @@ def settling_figure(settling: Settling) -> Figure:
 
 def _notes(settling: Settling) -> list[str]:
     """Note on a run that ends before the steady state."""
-    slow, end = settling.lying.approach_time, float(settling.way("time")[-1])
-    if settling.lying.state != "steady" or not slow > _SHORT * end:
+    slow, end = settling.steady_state.approach_time, float(settling.trajectory("time")[-1])
+    if settling.steady_state.state != "steady" or not slow > _SHORT * end:
         return []
     return [
         f"The run ends at {end:.3g} s; the remaining path to the steady motion, which is solved for, decays with a "
@@ -76,7 +76,7 @@ _STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewi
 def _legend(settling: Settling) -> list[Line2D]:
     """Legend of the panel with two lines, and of the resting pose, if there is one."""
     lines = [Line2D([], [], color=COLOURS[name], label=words) for words, name in _TILTS.items()]
-    return [*lines, *([Line2D([], [], **_STEADY, label="steady")] if settling.lying.state == "steady" else [])]
+    return [*lines, *([Line2D([], [], **_STEADY, label="steady")] if settling.steady_state.state == "steady" else [])]
 
 
 _SHOWN = {
