@@ -154,6 +154,6 @@ def test_entries_of_answers_are_declared_of_what_their_classes_have() -> None:
         own = classes[name].body
         known = computed | {node.name for node in own if isinstance(node, ast.FunctionDef)}
         known |= {ast.unparse(node.target) for node in own if isinstance(node, ast.AnnAssign)}
-        named = [row.attribute or row.entry for row in rows] + [row.given for row in rows if row.given]
+        named = [row.attribute for row in rows] + [row.given for row in rows if row.given]
         named += [row.unit.strip("{}") for row in rows if row.unit.startswith("{")]
         assert {path.partition(".")[0] for path in named if not path.startswith("=")} - known == set(), name

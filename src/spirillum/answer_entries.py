@@ -1,9 +1,10 @@
-"""Entries of answers as JSON, declared in `answers.csv`: a row for each, in order, by the name of the class.
+"""Entries of answers as JSON, declared in `answers.csv`: its rows in order, by the name of the class.
 
-The row of `schema` names the answer's kind. `entry` is the place in the JSON (`latency.median`); without it the
-entries of a mapping stand beside the others. `attribute` is where the value is found (`size.0`, a method without
-arguments), or text after `=`; without it, it is called as the entry. `unit` is SI, `*` that of the registry, or that of
-an attribute in braces. An entry with `if` is left out where that attribute is None, NaN, false or empty.
+The row of `schema` names the answer's kind. `entry` is the place in the JSON (`latency.median`), or several that are
+alike; without it the entries of a mapping stand beside the others. `attribute` is where the value is found (`size.0`, a
+method without arguments), what goes before the entry's name (`prediction.`), or text after `=`; without it, it is
+called as the entry. `unit` is SI, `*` that of the registry, or that of an attribute in braces. An entry with `given` is
+left out where that attribute is None, NaN, false or empty.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ class AnswerEntry(NamedTuple):
 def _declared() -> dict[str, list[AnswerEntry]]:
     found: dict[str, list[AnswerEntry]] = {}
     for row in records_of("answers.csv", AnswerEntry):
-        found.setdefault(row.answer, []).append(row)
+        for name in row.entry.split() or [""]:
+            attribute = f"{row.attribute}{name}" if row.attribute.endswith(".") else row.attribute or name
+            found.setdefault(row.answer, []).append(row._replace(entry=name, attribute=attribute))
     return found
 
 
-ENTRIES = _declared()  #: Rows by the name of the class.
+ENTRIES = _declared()  #: An entry each, by the name of the class.
 
 
 def answer_of(item: Any, **computed: Any) -> dict[str, Any]:
@@ -55,7 +58,7 @@ def content_of(item: Any, **computed: Any) -> dict[str, Any]:
         for part in path:
             table = table.setdefault(part, {})
         unit = str(_value(item, row.unit[1:-1], computed)) if row.unit.startswith("{") else row.unit
-        value = _in_unit(_value(item, row.attribute or row.entry, computed), unit, name)
+        value = _in_unit(_value(item, row.attribute, computed), unit, name)
         table.update({name: value} if name else value)
     return found
 
