@@ -255,9 +255,10 @@ static double median(double *values, int64_t count) {
  * Returns The residual scale over the expected one, at least 1/2.
  *
  * shifts: displacement of each edge along its normal, pixels; slopes: Jacobian of the displacements; weights: inverse
- * variances, 0 for invalid edges; used: the final weights, 0 for outliers; change: the pose change. */
+ * variances, 0 for invalid edges; least: residual scale over the expected one below which the biweight gets no
+ * narrower; used: the final weights, 0 for outliers; change: the pose change. */
 EXPORT double robust_change(const double *shifts /* (count) */, const double (*slopes)[3] /* (count, 3) */,
-                            const double *weights /* (count) */, double *work /* (2, count) */,
+                            const double *weights /* (count) */, double least, double *work /* (2, count) */,
                             double *used /* (count) */, double change[3], int64_t count) {
     const double mad_to_sigma = 1.4826; /* of a normal distribution, 1/Phi^-1(3/4) */
     double size[3] = {1e-300, 1e-300, 1e-300}, level = 1.0, *misses = work, *known = work + count;
@@ -276,7 +277,7 @@ EXPORT double robust_change(const double *shifts /* (count) */, const double (*s
         }
         level = larger(0.5, mad_to_sigma * median(known, edges));
         for (int64_t i = 0; i < count; i++) {
-            const double share = weights[i] > 0.0 ? misses[i] / (4.685 * level) : 1.0;
+            const double share = weights[i] > 0.0 ? misses[i] / (4.685 * larger(least, level)) : 1.0;
             used[i] = share < 1.0 ? weights[i] * squared(1.0 - share * share) : 0.0;
         }
     }

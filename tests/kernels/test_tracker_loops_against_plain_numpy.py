@@ -97,24 +97,38 @@ def test_shifts_are_those_of_linear_least_squares(rng: np.random.Generator) -> N
         assert residuals[k] == pytest.approx(np.sqrt(rest[0] / 9.0), rel=1e-9)
 
 
-@pytest.mark.parametrize("count", [40, 41])
-def test_a_robust_change_is_that_of_reweighted_least_squares(rng: np.random.Generator, count: int) -> None:
+@pytest.mark.parametrize(("count", "least"), [(40, 0.0), (41, 1.0)])
+def test_a_robust_change_is_that_of_reweighted_least_squares(
+    rng: np.random.Generator, count: int, least: float
+) -> None:
     slopes, weights = rng.normal(size=(count, 3)) * [700.0, 700.0, 20.0], rng.uniform(0.5, 2.0, count)
     shifts = slopes @ [1e-3, -5e-4, 0.01] + 0.3 * rng.normal(size=count)
     shifts[::9] += 20.0
     weights[::7] = 0.0
     used, change = np.empty(count), np.empty(3)
-    level = robust_change(shifts, slopes, weights, np.empty((2, count)), used, change)
+    level = robust_change(shifts, slopes, weights, least, np.empty((2, count)), used, change)
     known, now = weights > 0.0, weights * np.minimum(1.0, 0.5 / np.abs(shifts))
     for _ in range(6):
         root = np.sqrt(now)
         expected = np.linalg.lstsq(root[:, None] * slopes, root * shifts, rcond=None)[0]
         misses = np.abs(shifts - slopes @ expected) * np.sqrt(weights)
         scale = max(0.5, 1.4826 * np.median(misses[known]))
-        now = weights * np.maximum(1.0 - (misses / (4.685 * scale)) ** 2, 0.0) ** 2
+        now = weights * np.maximum(1.0 - (misses / (4.685 * max(least, scale))) ** 2, 0.0) ** 2
     assert change == pytest.approx(expected, rel=1e-6)
     assert level == pytest.approx(scale, rel=1e-6)
     assert used == pytest.approx(now, rel=1e-5, abs=1e-6)
+
+
+def test_sides_that_fit_well_reject_no_end_within_its_error() -> None:
+    """150 sides without any misfit, and 20 ends whose shifts are up to 2.6 of their errors from the mean of them."""
+    slopes = np.repeat([[0.0, 1.0, 0.0], [1.0, 0.0, 1e-3]], (150, 20), axis=0)
+    slopes[:150, 2] = np.linspace(-1.0, 1.0, 150)
+    shifts = np.concatenate([np.zeros(150), 1.0 + np.linspace(-2.6, 2.6, 20)])
+    used, change = np.empty(170), np.empty(3)
+    level = robust_change(shifts, slopes, np.ones(170), 1.0, np.empty((2, 170)), used, change)
+    assert level == 0.5
+    assert change[0] == pytest.approx(1.0, abs=0.02)  # six steps
+    assert used.min() > 0.4
 
 
 def test_sums_take_the_nearest_sample_of_each_row(rng: np.random.Generator) -> None:

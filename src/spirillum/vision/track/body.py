@@ -338,6 +338,7 @@ class BodyFinder:
 
     def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> PoseFit:
         change, level = np.empty(3), 1.0
+        least = 0.0 if self.seal is None else SEAL.least_scale
         pose = np.array(guess)
         lost = PoseFit(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
         if seal_only and part.colours is None:
@@ -349,7 +350,7 @@ class BodyFinder:
                 return lost
             used, work = np.empty(known.size), np.empty((2, known.size))
             shifts = np.where(known, edges.shifts, 0.0)
-            level = robust_change(shifts, slopes, 1.0 / edges.variance, work, used, change)
+            level = robust_change(shifts, slopes, 1.0 / edges.variance, least, work, used, change)
             pose = pose + change
             if step > rough and float(np.abs(slopes @ change).max()) < 0.01:
                 break

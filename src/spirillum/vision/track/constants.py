@@ -65,6 +65,9 @@ class SealConstants:
     follows: tuple[float, float] = (0.4, 0.4)
     """Scatter about the motion of all edges that move with the body, along and across, beyond which an edge does not,
     pixels."""
+    least_scale: float = 1.0
+    """Residual scale over the expected one below which no further edges are outliers: sides that fit better than their
+    errors would else reject ends of the seal that scatter by theirs."""
     fewest_of_side: int = 5  #: Fewest edges at each of two sides whose distance gives the seal's size.
     proportions: float = 0.15
     """Relative difference of its length and its width from which on a block of colour is no whole seal."""
