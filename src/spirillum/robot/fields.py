@@ -25,7 +25,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from spirillum.data_tables import field_texts
+from spirillum.data_tables import field_texts, rows_of
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.units import KINDS, Kind, parse_quantity
 
@@ -183,16 +183,10 @@ ResistancePerCurrent = Annotated[float, *_quantity("resistance per current")]
 Factor = Annotated[float, Field(strict=True, ge=1e-3, le=1e3, allow_inf_nan=False)]
 
 
-_OTHERWISE = {
-    "tail.turns": "tail.length over tail.wavelength is the number of turns",
-    "tail.pitch": "tail.wavelength is the pitch of the helix, a length",
-    "tail.radius": "tail.amplitude is the radius of the helix's centreline",
-    "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
-    **dict.fromkeys(("extends", "body", "coupling", "fluid"), "it belongs in a robot file"),
-    **dict.fromkeys(("robots", "vary", "models"), "it belongs in a study file"),
-    "markers": "it belongs in a setup file",
-}
+_OTHERWISE = {row["field"]: row["remedy"] for row in rows_of("robot/other_fields.csv")}
 """Derived quantities that are no fields of a robot file, and fields of other files, with their remedies."""
+_ALLOWED = {row["error"]: row["allowed"] for row in rows_of("robot/allowed_kinds.csv")}
+"""Allowed values by pydantic's kinds of errors that name no fields."""
 _IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' reverses the tail's rotation"}
 """Remedies for out-of-range numbers whose meaning is expressed by another field."""
 _LONGEST_FIELD = 200  # characters of a field's name in a sentence, so that what is allowed has room
@@ -276,26 +270,9 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
     """Allowed values, for the kinds of errors that name no fields."""
     kind, context = problem["type"], problem.get("ctx", {})
     kind = f"string_{kind}" if kind in ("too_long", "too_short") and isinstance(problem.get("input"), str) else kind
-    words = {
-        "model_type": f"a [{field}] table",
-        "tuple_type": "a list, [...]",
-        "list_type": "a list, [...]",
-        "dict_type": "a table, { name = value }",
-        "too_long": f"at most {_entries(context.get('max_length'))}",
-        "too_short": f"at least {_entries(context.get('min_length'))}",
-        "int_parsing": "a whole number",
-        "int_type": "a whole number",
-        "int_from_float": "a whole number",
-        "float_parsing": "a number",
-        "float_type": "a number",
-        "string_too_long": f"at most {context.get('max_length')} characters",
-        "string_too_short": "text that is not empty",
-        "string_type": "text in quotes",
-        "bool_type": "true or false",
-        "bool_parsing": "true or false",
-    }
-    if kind in words:
-        return words[kind]
+    if kind in _ALLOWED:
+        most, least = context.get("max_length"), context.get("min_length")
+        return _ALLOWED[kind].format(field=field, length=most, most=_entries(most), least=_entries(least))
     if kind in ("greater_than_equal", "less_than_equal") and field in _IN_ITS_RANGE:
         return _IN_ITS_RANGE[field]
     own = {"literal_error": "expected", "value_error": "error"}
