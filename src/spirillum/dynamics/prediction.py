@@ -136,7 +136,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         raise InputError(
             "band = True with motion 'free' in the tube, where the robot finds its own pose; allowed: motion 'held'"
         )
-    from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
+    from spirillum.dynamics.free_motion import free_motion
 
     found = free_motion(
         own,

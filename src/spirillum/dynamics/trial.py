@@ -21,7 +21,8 @@ import numpy as np
 from spirillum.answer_entries import content_of
 from spirillum.arrays import Samples
 from spirillum.data_tables import rows_of
-from spirillum.dynamics.release import InTube, Release
+from spirillum.dynamics.integration import INTERRUPTED
+from spirillum.dynamics.release import InTube, Release, check_roughness
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import is_held, state_of
 from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
@@ -88,8 +89,6 @@ def trial_of(held: Prediction, run: Callable[[], xr.Dataset], duration: float) -
         dataset = run()
     except InputError as error:
         return ReleasedMotion(reason=str(error))
-    from spirillum.dynamics.integration import INTERRUPTED  # loads compiled loops
-
     if INTERRUPTED in str(dataset.attrs["events"]):
         raise KeyboardInterrupt
     return trial_means(dataset)
@@ -282,7 +281,7 @@ def quick_run(
     **settings: Any,
 ) -> xr.Dataset:
     """Return the run of one of many trials, with a waiting time, in larger steps than `simulate`."""
-    from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
+    from spirillum.dynamics.tube_simulation import run_in_tube  # for a trial alone
 
     steady = predict_steady(robot, model=WALLED, placement=release.placement, band=False, **settings)
     times = Timing.of({"duration": duration, "samples_per_turn": _SAMPLES_PER_TURN})
@@ -310,16 +309,13 @@ class TrialRequest:
         """Refuse what no trial can have, before the held answer is computed."""
         if self._given:
             robot = self.fit.central(self.robot)
-            placed = self.fit.placed(robot, Placement.of(self.placement))
-            reason = why_not_released(robot, model, tail_rate, RobotBatch.of(robot, placed))
+            reason = why_not_released(robot, model, tail_rate, RobotBatch.of(robot))
             if not wanted or reason:
                 self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
         release, channel = self._release, self.robot.channel
         if release.roughness is not None and channel is not None:
-            from spirillum.dynamics.release import check_roughness  # loads compiled loops
-
             diameter = self.robot.body.diameter
             gap = gap_of(release.placement, diameter, 0.5 * channel.diameter)
             check_roughness(release.roughness, gap, diameter)
@@ -359,7 +355,7 @@ class TrialRequest:
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""
-        from spirillum.dynamics.simulation import simulate  # its equations are compiled
+        from spirillum.dynamics.simulation import simulate  # for a trial alone
 
         settings: dict[str, Any] = {"in_tube": self.in_tube, "timing": {"duration": self._length}}
         settings |= {"calibration": self.fit, "draws": None if self.fit.posterior is None else 0}
@@ -370,7 +366,7 @@ class TrialRequest:
 
     def steady(self) -> ReleasedMotion:
         """Return the steady motion; it is found in seconds, which no progress is told of."""
-        from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
+        from spirillum.dynamics.free_motion import free_motion  # for a trial alone
 
         still = self.in_tube.model_copy(update={"wait": None})
         try:
@@ -412,7 +408,7 @@ class TrialRequest:
         weight = 0.0 if derived is None else derived.value
         stated = {name: getattr(release.in_tube, name) for name in ("wait", "friction_coefficient")}
         stated["roughness"] = release.roughness
-        table = table_for(RobotBatch.of(robot, self.fit.placed(robot, release.placement)))
+        table = table_for(RobotBatch.of(robot))
         unknowns = open_unknowns(robot, weight, stated)
 
         def run(sample: TrialSample) -> ReleasedMotion:
@@ -437,7 +433,7 @@ class TrialRequest:
 
     def _discrepancy(self, samples: Sequence[TrialSample], runs: Sequence[ReleasedMotion]) -> Mapping[str, Samples]:
         """Factors of the discrepancy of the posterior's model on runs of its draws."""
-        from spirillum.dynamics.fitted_runs import discrepancy_factors  # loads compiled loops
+        from spirillum.dynamics.fitted_runs import discrepancy_factors  # for a trial alone
 
         known = self.fit.posterior
         assert known is not None  # noqa: S101 - of a posterior's draws alone

@@ -30,7 +30,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.swimming.balance import find_friction_model
 from spirillum.swimming.band import Band, band_of, no_band_warnings
-from spirillum.swimming.intervals import PosteriorFor
+from spirillum.swimming.intervals import PosteriorFor, intervals_of, knows_torque, without_torque
 from spirillum.swimming.motions import (
     STEADY,
     Intervals,
@@ -203,8 +203,6 @@ def predict_steady(
         _check_band(choice.model)
     intervals, torque = None, []
     if drawn is not None:
-        from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque  # loads compiled loops
-
         intervals = intervals_of(
             ready,
             chosen,
