@@ -136,9 +136,7 @@ _STRAYS = 5  # ...but not more than so many in a row
 class PositionFilter:
     """The filter of one run."""
 
-    def __init__(
-        self, lab: Lab, speed: float, *, start: float = 0.0, walk: float = _SPEED_WALK, drift: float = _DRIFT
-    ) -> None:
+    def __init__(self, lab: Lab, speed: float, *, walk: float = _SPEED_WALK, drift: float = _DRIFT) -> None:
         """Start at a speed of full duty, m/s, as uncertain as large; `walk` in 1/sqrt(s), `drift` in m/s."""
         self._noise = max(lab.camera.position_noise, 1e-6) ** 2
         self._wander, self._memory = lab.camera.position_wander, lab.camera.memory
@@ -146,7 +144,7 @@ class PositionFilter:
         self._walk = (walk * abs(speed)) ** 2
         self._sent: deque[tuple[float, float]] = deque([(0.0, 0.0)])
         self._time, self._strays, self._drift = 0.0, 0, drift
-        self._mean: Samples = np.array([start, speed, 0.0, 0.0])
+        self._mean: Samples = np.array([0.0, speed, 0.0, 0.0])
         self._spread: Samples = np.diag([1e-3, abs(speed), drift, self._wander]) ** 2
 
     def send(self, time: float, duty: float) -> None:

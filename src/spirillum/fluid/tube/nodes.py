@@ -119,10 +119,10 @@ class Places:
             count += (len(self.yaw_gaps) - 1) * len(self.yaw_pitches) * len(YAW_SHARES) + self.stage.held_out
         return count
 
-    def time_to_solve(self, workers: int = 2) -> str:
-        """How long a fast and a slow machine need for them, in words."""
+    def time_to_solve(self) -> str:
+        """How long a fast and a slow machine need for them with two processes, in words."""
         fast, slow = self.stage.seconds
-        return time_on_free_cores((self.solutions * fast, self.solutions * slow), workers)
+        return time_on_free_cores((self.solutions * fast, self.solutions * slow), workers=2)
 
     @cached_property
     def yaw_gaps(self) -> Samples:
