@@ -48,7 +48,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     motion: str | None = None,
     friction: str | None = None,
     calibrated: bool = True,
-    calibration: str | Path | Fit | None = None,
+    calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     draws: int | None = None,
     timing: Timing | Mapping[str, Any] | None = None,
@@ -103,6 +103,44 @@ def simulate(  # noqa: PLR0913 - the options of the command
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
     """
     fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated, answer=None)
+    return simulate_fitted(
+        load(robot),
+        fit,
+        model=model,
+        motion=motion,
+        friction=friction,
+        calibrated=calibrated,
+        draws=draws,
+        timing=timing,
+        resolution=resolution,
+        placement=placement,
+        weight=weight,
+        roughness=roughness,
+        in_tube=in_tube,
+        field=field,
+        progress=progress,
+    )
+
+
+def simulate_fitted(  # noqa: PLR0913 - the options of `simulate`
+    robot: Robot,
+    fit: Fit,
+    *,
+    model: str,
+    calibrated: bool,
+    motion: str | None = None,
+    friction: str | None = None,
+    draws: int | None = None,
+    timing: Timing | Mapping[str, Any] | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    weight: bool = True,
+    roughness: str | float | None = None,
+    in_tube: InTube | Mapping[str, Any] | None = None,
+    field: Field | Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Simulate a loaded robot with a fit that was read; otherwise as `simulate`."""
     known = fit.posterior
     release, times = Release.of(placement, in_tube, roughness, weight=weight), Timing.of(timing)
     placed, requested = release.placement, release.in_tube
@@ -110,8 +148,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     number = sample_count(draws, known)
     if friction is not None:
         find_friction_model(friction)
-    own = load(robot)
-    central = own if known is None else known.central(own)
+    central = robot if known is None else known.central(robot)
     contact = fit.contact()
     choice, motion, notes = chosen_run(model, motion, central, placed, fit)
     model = choice.model
@@ -128,7 +165,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         check_full(find_swimmer_model(model))
     _check_in_tube(requested, model, walled=walled, drawn=known is not None)
     if walled:
-        check_not_resolved(own, resolution)
+        check_not_resolved(robot, resolution)
         release, times = release._replace(in_tube=requested.of_trial(placed)), times.of_trial()
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:

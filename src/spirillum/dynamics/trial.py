@@ -355,12 +355,12 @@ class TrialRequest:
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""
-        from spirillum.dynamics.simulation import simulate  # for a trial alone
+        from spirillum.dynamics.simulation import simulate_fitted  # for a trial alone
 
         settings: dict[str, Any] = {"in_tube": self.in_tube, "timing": {"duration": self._length}}
-        settings |= {"calibration": self.fit, "draws": None if self.fit.posterior is None else 0}
         settings |= {"model": WALLED, "progress": self.progress, "calibrated": self.calibrated}
-        nominal = trial_of(held, lambda: simulate(**self._shared(), **settings), self._length)
+        settings |= {"fit": self.fit, "draws": None if self.fit.posterior is None else 0}
+        nominal = trial_of(held, lambda: simulate_fitted(**self._shared(), **settings), self._length)
         self._announce("trial", *(nominal.values.get(name) for name in ("forward_velocity", "tail_rotation_rate")))
         return self._with_interval(held, nominal) if self.interval else nominal
 
