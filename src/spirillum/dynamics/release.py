@@ -26,7 +26,7 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.tube_pose import GAP_SHARE, TubePose, gap_of, largest_gap
+from spirillum.robot.tube_pose import TubePose, gap_of, largest_gap
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import KINDS, parse_option, show
 
@@ -209,21 +209,15 @@ def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Sample
 
 def state_at_release(robot: Robot, links: TubeRobot, placed: Placement, azimuth: float = 0.0) -> Samples:
     """The state of a robot at rest at a pose, (19,)."""
-    radius, a, pitch = float(links.tube[core.TUBE_RADIUS]), 0.5 * robot.body.diameter, placed.pitch or 0.0
-    if placed.eccentricity is not None:
-        offset = placed.eccentricity * (radius - a)
-    else:
-        gap = GAP_SHARE * a if placed.gap is None else placed.gap
-        body = outlines_of(robot)["body"]
-        offset = TubePose.at_gap(body, radius, gap, pitch, yaw=placed.yaw).offset
-        if not offset >= -1e-12 * radius:
-            most = max(largest_gap(body, radius, pitch, placed.yaw), 0.0)
-            raise InputError(
-                f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
-                f"{show(most, 'mm')}, or a smaller pitch or yaw"
-            )
-        offset = max(offset, 0.0)
-    state = state_at(offset, start_phase(robot), pitch, placed.yaw, azimuth)
+    radius, body, pitch = float(links.tube[core.TUBE_RADIUS]), outlines_of(robot)["body"], placed.pitch or 0.0
+    offset = TubePose.of(placed, body, robot.body.diameter, radius).offset
+    if not offset >= -1e-12 * radius:
+        gap, most = gap_of(placed, robot.body.diameter, radius), largest_gap(body, radius, pitch, placed.yaw)
+        raise InputError(
+            f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
+            f"{show(max(most, 0.0), 'mm')}, or a smaller pitch or yaw"
+        )
+    state = state_at(max(offset, 0.0), start_phase(robot), pitch, placed.yaw, azimuth)
     gaps = links.gaps(state)
     if gaps.min() <= 0.0:
         name = links.names[int(np.argmin(gaps))]

@@ -54,16 +54,12 @@ class Placement(Options):
                 f"placement.eccentricity = {self.eccentricity:g} is given together with "
                 f"placement.gap = {show(self.gap, 'mm')}; allowed: one of them"
             )
-        if self.eccentricity is not None and self.pitch:
-            problems.append(
-                f"placement.pitch = {show(self.pitch, 'deg')} is given together with placement.eccentricity; "
-                "allowed: 0 deg, or placement.gap for a pitched robot"
-            )
-        if self.eccentricity is not None and self.yaw:
-            problems.append(
-                f"placement.yaw = {show(self.yaw, 'deg')} is given together with placement.eccentricity; "
-                "allowed: 0 deg, or placement.gap for a yawed robot"
-            )
+        for name, angle in (("pitch", self.pitch), ("yaw", self.yaw)):
+            if self.eccentricity is not None and angle:
+                problems.append(
+                    f"placement.{name} = {show(angle, 'deg')} is given together with placement.eccentricity; "
+                    f"allowed: 0 deg, or placement.gap for a {name}ed robot"
+                )
         if self.flow is not None and self.ends is not None:
             problems.append(
                 f"placement.ends = '{self.ends}' is given together with placement.flow = {show(self.flow, 'mm/s')}; "
