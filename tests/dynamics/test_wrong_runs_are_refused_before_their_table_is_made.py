@@ -96,3 +96,29 @@ def test_run_whose_picture_cannot_be_written_is_refused_before_it(tmp_path: Path
     assert found.exit_code != 0
     assert not run.exists()
     assert "/proc/run.png cannot be written" in str(found.exception)
+
+
+@pytest.mark.parametrize("given", ["robot", "resolution"])
+def test_a_table_that_has_to_be_there_is_not_made(monkeypatch: pytest.MonkeyPatch, given: str) -> None:
+    """Every function that would make one first says how it is made instead; where it is, it answers."""
+
+    def made(*_: Any, **__: Any) -> Any:
+        raise AssertionError("a table would be made")
+
+    for module in (simulation, free_motion):
+        monkeypatch.setattr(module, "table_for", preparation.table_for)
+    monkeypatch.setattr(preparation, "prepared_tables", made)
+    monkeypatch.setattr("spirillum.studies.run.prepared_tables", made)
+    own = {"model.tube.form": "table"} if given == "robot" else {}
+    form = {} if own else {"resolution": {"form": "table"}}
+    odd = sp.load("biorob2012-wide", **ODD, **own)
+    calls = [lambda: sp.simulate(odd, **form), lambda: sp.predict(odd, motion="free", **form)]
+    if own:
+        study = {"robots": ["biorob2012-wide"], "models": ["auto"]}
+        calls += [lambda: sp.settle(odd), lambda: sp.Plant(odd), lambda: sp.study(study, overrides={**ODD, **own})]
+    for call in calls:
+        with pytest.raises(InputError, match=r"form = 'table': .*no table of .*`spirillum prepare`"):
+            call()
+    monkeypatch.undo()
+    short = {"timing": {"duration": "0.1 s"}, "in_tube": {"wait": "0 s"}}
+    assert sp.simulate(sp.load("biorob2012-wide", **own), **short, **form).attrs["model"] == "tube"

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from spirillum.dynamics.release import InTube, check_not_resolved
+from spirillum.dynamics.release import InTube, without_resolution
 from spirillum.dynamics.trial import TrialRequest
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, FITTED_TRIAL, read_fit
@@ -131,7 +131,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             raise InputError(
                 f"{name} = {as_given(value, 's')} with motion 'free'; allowed: without a motion, of the trial"
             )
-    check_not_resolved(own, resolution)
+    own = without_resolution(own, resolution)
     if band:
         raise InputError(
             "band = True with motion 'free' in the tube, where the robot finds its own pose; allowed: motion 'held'"

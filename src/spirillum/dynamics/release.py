@@ -94,15 +94,16 @@ class Release(NamedTuple):
         )
 
 
-def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> None:
-    """Refuse a resolution of free motion in the tube, which reads the robot's table at every phase."""
-    with_resolution(robot, resolution, "tube")  # a wrong value has a sentence of its own
+def without_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> Robot:
+    """The robot with the form of its table; a resolution is refused in free motion, which reads it at every phase."""
+    found = with_resolution(robot, resolution, "tube")  # a wrong value has a sentence of its own
     for name, value in Resolution.of(resolution).model_dump(exclude_none=True).items():
         if (name, value) not in (("form", "auto"), ("form", "table")):
             raise InputError(
                 f"{name} = {value!r} with model 'tube' and motion 'free', which reads the robot's table at every phase "
                 "of the tail; allowed: motion 'held'"
             )
+    return found
 
 
 def read_flow(path: str | Path) -> Samples:

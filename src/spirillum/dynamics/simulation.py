@@ -14,7 +14,7 @@ from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_interv
 from spirillum.dynamics.free_robot import two_links
 from spirillum.dynamics.integration import integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.release import InTube, Release, check_not_resolved, reach_of, resting_state, turning_rate
+from spirillum.dynamics.release import InTube, Release, reach_of, resting_state, turning_rate, without_resolution
 from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
 from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.dynamics.timing import Timing
@@ -165,14 +165,14 @@ def simulate_fitted(  # noqa: PLR0913 - the options of `simulate`
         check_full(find_swimmer_model(model))
     _check_in_tube(requested, model, walled=walled, drawn=known is not None)
     if walled:
-        check_not_resolved(robot, resolution)
+        without_resolution(robot, resolution)
         release, times = release._replace(in_tube=requested.of_trial(placed)), times.of_trial()
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None
         there = release.with_contact(contact if drawn is None else drawn.contact(draw))
         there = there if drawn is None else there._replace(placement=drawn.placed(one, placed, draw))
-        table = table_of_run(one, there, tell) if walled else None
+        table = table_of_run(without_resolution(one, resolution), there, tell) if walled else None
         steady = predict_steady(
             one,
             model=model,

@@ -77,7 +77,8 @@ class TubeOptions(Section):
     """Options of the robot in its tube; its wires are `high` unless they are long, or `SlenderOptions` asks for it."""
 
     form: TubeForm = "auto"
-    """`table` (see `spirillum prepare`), `direct` (the flow is solved for), or `auto`: the table where there is one."""
+    """`table` (see `spirillum prepare`; none is made), `direct` (the flow is solved for), or `auto`: the table where
+    there is one; runs make it."""
 
     tolerance: Tolerance = 0.005  #: Relative tolerance of the speed per turn, from which the resolution follows.
     phases: Phases = 3  #: Number of phases of the tail, evenly over a turn, that an answer is averaged over.
@@ -117,7 +118,8 @@ class Resolution(Options):
     phases: Annotated[int, BeforeValidator(whole(1, 64))] | None = None
     """Of `tube`: number of phases of the tail to average over, 1 to 64."""
     form: Annotated[TubeForm, BeforeValidator(one_of("auto", "table", "direct"))] | None = None
-    """Of `tube`: from the robot's `table`, `direct`, or `auto`: from the table where there is one."""
+    """Of `tube`: from the robot's `table` (none is made), `direct`, or `auto`: the table where there is one; runs make
+    it."""
 
 
 class FittedTo(Section):

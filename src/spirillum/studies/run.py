@@ -45,7 +45,7 @@ from spirillum.studies.released_robots import (
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
-from spirillum.swimming.preparation import has_table, missing_tables
+from spirillum.swimming.preparation import check_may_be_made, has_table, missing_tables
 from spirillum.swimming.scenario import CONSTANT_TORQUE, calibration_warnings
 from spirillum.version import package_version
 from spirillum.worker_pool import ESTIMATE, WorkerPool, map_tasks
@@ -265,7 +265,10 @@ def make_tables(loaded: LoadedStudy, pool: WorkerPool, progress: Progress) -> No
     if not loaded.makes_tables:
         return
     stage: StageName = "yaw" if loaded.study.predicted or loaded.study.settled or loaded.study.trial else "straight"
-    missing = dict.fromkeys(one for _, batch in groups(loaded) for one in missing_tables(batch, stage))
+    lacking = [(batch, found) for _, batch in groups(loaded) if (found := missing_tables(batch, stage))]
+    for batch, _ in lacking:
+        check_may_be_made(batch, stage)
+    missing = dict.fromkeys(one for _, found in lacking for one in found)
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
         holds = "for release" if stage == "yaw" else "for fixed poses"

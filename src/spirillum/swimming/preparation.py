@@ -307,7 +307,19 @@ def check_usual_resolution(options: ModelOptions) -> None:
 
 def table_for(batch: RobotBatch, *, progress: Progress | None = None) -> TubeTable:
     """Return the table, with yawed poses, for motion of the first robot of a batch in its tube; made if missing."""
-    return prepared_tables([_table_request(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
+    request = _table_request(batch)
+    if find_table(*request, "yaw") is None:
+        check_may_be_made(batch, "yaw")
+    return prepared_tables([request], stage="yaw", workers=_WORKERS, progress=progress)[0]
+
+
+def check_may_be_made(batch: RobotBatch, stage: StageName) -> None:
+    """Refuse to make a missing table for a robot that answers from one that is there."""
+    if batch.options.tube.form == "table":
+        raise InputError(
+            "model.tube.form = 'table': the robot has no table of its tube yet; allowed: `spirillum prepare` (or "
+            f"sp.prepare) first, or form 'auto', which makes it in {preparation_time(batch, stage)}"
+        )
 
 
 def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeometry, float]]:
