@@ -105,8 +105,7 @@ def test_a_table_that_has_to_be_there_is_not_made(monkeypatch: pytest.MonkeyPatc
     def made(*_: Any, **__: Any) -> Any:
         raise AssertionError("a table would be made")
 
-    for module in (simulation, free_motion):
-        monkeypatch.setattr(module, "table_for", preparation.table_for)
+    monkeypatch.setattr(tube_simulation, "table_for", preparation.table_for)
     monkeypatch.setattr(preparation, "prepared_tables", made)
     monkeypatch.setattr("spirillum.studies.run.prepared_tables", made)
     own = {"model.tube.form": "table"} if given == "robot" else {}
