@@ -58,6 +58,16 @@ def test_prediction_shows_five_quantities_and_completes_all() -> None:
     assert "<table>" in answer._repr_html_()
 
 
+def test_a_released_motion_prints_its_quantities_or_why_there_is_none() -> None:
+    found = sp.predict("biorob2012-wide", interval=False)
+    trial, none = found.trial, sp.predict("ecoli").trial
+    assert trial is not None
+    speed = f"{1e3 * trial.values['forward_velocity']:.4g} mm/s"
+    assert repr(trial) == f"ReleasedMotion(U_x = {speed})"
+    assert str(trial).splitlines()[:2] == ["released motion", f"  forward velocity     {speed}"]
+    assert str(none) == "the robot has no channel in which it could be released"
+
+
 def test_comparison_and_resistance_print_their_numbers() -> None:
     found = sp.compare_models("biorob2012-wide", models=["sbt", "rft"])
     assert str(found).count("mm/s") == 2

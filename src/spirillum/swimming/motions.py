@@ -141,8 +141,8 @@ class TrialInterval(NamedTuple):
     level: float
 
 
-@dataclass(frozen=True)
-class ReleasedMotion:
+@dataclass(frozen=True, repr=False)
+class ReleasedMotion(DisplayMixin):
     """A trial or a steady motion in the tube, or the reason why there is none; SI, rates signed about +x."""
 
     values: Mapping[str, float] = field(default_factory=dict)
@@ -164,6 +164,16 @@ class ReleasedMotion:
         }
         error = {"error_estimate": quantity(self.error, "1")} if math.isfinite(self.error) else {}
         return {**self.basis, **error, **values}
+
+    def _display_content(self) -> tuple[dict[str, Any], None]:
+        """See `DisplayMixin`: the motion first, then what it rests on."""
+        own = self.to_dict()
+        first = {name: own[name] for name in self.values if name in own}
+        return {"schema": "spirillum.released-motion/1", **first, **own}, None
+
+    def __str__(self) -> str:
+        """The motion for `print`, or why there is none."""
+        return self.reason or super().__str__()
 
 
 State = Literal["steady", "orbits", "goes around", "changing"]
