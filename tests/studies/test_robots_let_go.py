@@ -6,6 +6,7 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
+from spirillum.results.study_content import ranking_content
 from spirillum.robot.placement import Placement
 from spirillum.studies.ranking import STEADY_SPEED, StudyRanking, best_in_words, ranking_of
 from spirillum.studies.released_robots import SETTLED_STATES, SettledTask, not_settled
@@ -95,6 +96,9 @@ def test_ranking_orders_by_the_speed_when_let_go() -> None:
     first = ranking.to_dict()["best"][0]
     assert (first["what"], first["robot"]) == ("fastest once settled", "25 x 2.5 mm")
     assert "Fastest once settled" in ranking_picture(ranking).title
+    slow = ranked(8e-5, 6e-5, 9e-5)  # in the unit of the held speeds beside it
+    assert slow.message.startswith("fastest once settled: 25 x 2.5 mm, 0.09 mm/s, ")
+    assert ranking_content(slow)["best"][0].startswith("fastest once settled: 25 x 2.5 mm, 0.09 mm/s, ")
 
 
 def test_robots_that_were_not_let_go_come_last_the_faster_held_one_first() -> None:

@@ -27,7 +27,7 @@ from spirillum.studies.ranking import (
     ranking_of,
     unit_of_ranked,
 )
-from spirillum.units import display_unit, in_unit
+from spirillum.units import in_unit
 
 FRICTION_MEANINGS = {
     "none": "no friction: the tail turns against the fluid alone, so that rates and speeds are upper bounds",
@@ -55,17 +55,16 @@ def ranking_content(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str,
         + (f"; {ranking.basis}" if ranking.basis else ""),
         "first": order_in_words(ranking.lead, held=ranking.held).capitalize(),
         "ends": ENDS.get(ranking.kind, ""),
-        "best": [best_in_words(best.to_dict(), _size(best), held=ranking.held) for best in ranking.best],
+        "best": [best_in_words(best.to_dict(), _size(best, ranking), held=ranking.held) for best in ranking.best],
         "header": ["robot", *(title for title, _ in columns)],
         "rows": [[one["robot"], *(cells[n] for _, cells in columns)] for n, one in enumerate(robots[:most])],
         "more": max(len(ranking.robots) - most, 0),
     }
 
 
-def _size(best: Best) -> str:
-    """The value of the best robot, with its unit."""
-    value, unit = best.robot.values[best.quantity], unit_of_ranked(best.quantity)
-    shown = display_unit(value, unit)
+def _size(best: Best, ranking: StudyRanking) -> str:
+    """The value of the best robot, in the unit of its column."""
+    value, unit, shown = best.robot.values[best.quantity], unit_of_ranked(best.quantity), ranking.unit(best.quantity)
     return f"{in_unit(value, unit, shown)} {shown}".removesuffix(" 1")
 
 

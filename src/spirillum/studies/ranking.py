@@ -149,10 +149,18 @@ class StudyRanking:
         first = self.robots[0]
         by = self.lead if np.isfinite(first.values[self.lead]) else "forward_velocity"
         speed, low, high = (of[by] for of in (first.values, first.low, first.high))
-        shown = display_unit(speed, "m/s")
+        shown = self.unit(by)
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
         size = f"{in_unit(speed, 'm/s', shown)} {shown}{band}"
         return best_in_words(next(best for best in self.best if best.quantity == by).to_dict(), size, held=self.held)
+
+    def unit(self, name: str) -> str:
+        """The unit in which people read a quantity: one for all speeds, as in the columns."""
+        own = unit_of_ranked(name)
+        sizes = [
+            abs(robot.values[other]) for robot in self.robots for other in robot.values if unit_of_ranked(other) == own
+        ]
+        return display_unit(max((size for size in sizes if np.isfinite(size)), default=0.0), own)
 
     @property
     def lead(self) -> str:
