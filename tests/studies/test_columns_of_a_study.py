@@ -1,9 +1,13 @@
 """The columns of a study beside its models: held by `tube`, and trials, as `predict` has them."""
 
+from pathlib import Path
+
 import pytest
 
 import spirillum as sp
+from spirillum.cli.tables.studies import study as study_table
 from spirillum.errors import InputError
+from spirillum.results.study import study_answer
 from spirillum.studies.ranking import HELD, TRIAL, ranking_of
 from spirillum.view.figures.comparison import ranking_picture
 
@@ -40,7 +44,7 @@ def test_the_answer_with_walls_leads_a_study_of_models_without() -> None:
     assert (lacking.lead, lacking.best[0].what) == ("forward_velocity", "fastest")
 
 
-def test_trials_of_a_study_are_those_of_predict() -> None:
+def test_trials_of_a_study_are_those_of_predict(tmp_path: Path) -> None:
     """One run each, equal to 1e-9, with its state and its pose; speed of contact that is stated too."""
     contact = {"roughness": "20 um", "friction_coefficient": 0.05}
     found = sp.study({**ONE, "trial": True, "contact": contact})
@@ -52,6 +56,11 @@ def test_trials_of_a_study_are_those_of_predict() -> None:
     assert found["trial"].attrs["flag_meanings"].split()[int(found["trial"][0])] == "swimming"
     assert "contact assumed, not validated" in str(found.attrs["warnings"])
     assert list(ranking_of(found).quantities)[:3] == [HELD, "forward_velocity", TRIAL]
+    assert [best.quantity for best in ranking_of(found).best][:3] == [HELD, TRIAL, "forward_velocity"]
+    said = [str(block) for block in study_table(study_answer(found, tmp_path))]
+    assert [line.startswith("in the lab: a robot laid in its tube swims as in trial; ") for line in said].count(
+        True
+    ) == 1
 
 
 @pytest.mark.slow

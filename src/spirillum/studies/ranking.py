@@ -188,6 +188,7 @@ class StudyRanking:
 
 
 _AT_A_POSE = " at a fixed pose"
+_AFTER_THE_LEAD = {TRIAL: -1, HELD: 1}  # what the lab shows next, of some robots alone last
 
 
 def order_in_words(lead: str, *, held: bool) -> str:
@@ -294,7 +295,7 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
         )
         for index in order
     }
-    judged = [known[0], *sorted(known[1:], key=(HELD, TRIAL).__contains__)]  # the columns beside the model's own last
+    judged = [known[0], *sorted(known[1:], key=lambda name: _AFTER_THE_LEAD.get(name, 0))]
     best = tuple(
         _best(chosen, name, values[name], ranked, ranked_as(name, known[0], model))
         for name in judged

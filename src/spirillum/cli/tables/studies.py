@@ -23,7 +23,7 @@ from spirillum.cli.tables.parts import (
 from spirillum.designs.design_result import ALTERNATIVES
 from spirillum.display import counted, percent
 from spirillum.notes import notes_in_answer
-from spirillum.studies.ranking import ENDS, HELD, best_in_words, order_in_words, ranked_columns
+from spirillum.studies.ranking import ENDS, HELD, TRIAL, best_in_words, order_in_words, ranked_columns
 from spirillum.units import display_unit, in_unit
 
 
@@ -93,6 +93,9 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
     if len(robots) > rows:
         yield f"and {len(robots) - rows} more: --rows, ranking.csv"
     yield from (best_in_words(best, held=ranking["held"]) for best in ranking["best"])
+    if TRIAL in names:
+        motions = f"trial{', later as in steady' if 'settled' in ranking else ''}"
+        yield f"in the lab: a robot laid in its tube swims as in {motions}; a fixed pose is for a known gap and pitch"
     if "settled" in ranking:
         yield Detail(ranking["settled"])
     if ranking["low_and_high"] in ENDS:
