@@ -75,6 +75,15 @@ def test_columns_stand_side_by_side(answer: Any) -> None:
     assert lab.endswith("swims as in trial, later as in steady; held is for a known gap and pitch")
 
 
+def test_ends_of_a_posterior_say_whose_interval_they_are(answer: Any) -> None:
+    """In the answer itself, for the column that they belong to."""
+    fitted = {**answer.to_dict(), "interval_of": "of a tail like those that were fitted"}
+    fitted["forward_velocity"] = fitted["forward_velocity"] | {"kind": "interval", "level": 0.95}
+    for shown, column in ((fitted, "held "), ({**fitted, "trial": {"reason": "-"}, "steady": {"reason": "-"}}, "")):
+        (line,) = (one for one in map(str, blocks_of(shown)) if "95 % interval" in one)
+        assert line == f"{column}low and high: 95 % interval of a tail like those that were fitted"
+
+
 def test_an_answer_over_poses_alone_says_what_the_lab_shows() -> None:
     """Of a robot in a tube; none without one, and none at a stated pose."""
     band = sp.predict("biorob2012-wide", tail_rate="1 Hz").to_dict()

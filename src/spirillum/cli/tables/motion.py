@@ -55,6 +55,9 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         yield f"and {more} more quantities: --all"
     if "gap" in answer["placement"] and "steady_state" not in answer:
         yield _over_poses(answer, "held" if released else "value")
+    if answer["forward_velocity"].get("kind") == "interval":
+        level = f"{100 * answer['forward_velocity']['level']:g} % interval"
+        yield f"{'held ' if released else ''}low and high: {level} {answer['interval_of']}"
     if "trial" in answer:
         yield from released_columns(answer, "; its interval: --interval")
     yield from _in_the_lab(answer, released)
@@ -67,10 +70,6 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     yield from reason_of(answer)
     if "other_models" in answer:
         yield Detail(answer["other_models"]["statement"])
-    if answer["forward_velocity"].get("kind") == "interval":
-        level = answer["forward_velocity"]["level"]
-        yield Detail(f"low and high: {100 * level:g} % interval of the robot's own motion")
-        yield Detail(f"interval {answer['interval_of']}")
     yield from error_of(answer["error_estimate"])
 
 
