@@ -40,6 +40,7 @@ def test_the_answer_with_walls_leads_a_study_of_models_without() -> None:
     own = ranking.best[1]
     assert (own.what, own.robot.name) == ("fastest by sbt, walls not computed", "20 x 2 mm")
     assert ranking_picture(ranking).draw().axes[1].get_xlabel() == "sbt (mm/s)"
+    assert ranking_of(found.assign({HELD: found[HELD].transpose()})).message == ranking.message
     lacking = ranking_of(found.assign({HELD: found[HELD].where(found["wavelength"] > 0.021)}))
     assert (lacking.lead, lacking.best[0].what) == ("forward_velocity", "fastest")
 

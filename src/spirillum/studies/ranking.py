@@ -275,8 +275,8 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     known = ["forward_velocity", "hydrodynamic_efficiency", "motor_current" if has_motor else "shaft_power"]
     beside = [name for name in _BESIDE if name in chosen and bool(np.isfinite(chosen[name].values).any())]
     known[1:1] = [name for name in beside if name != STEADY_SPEED]
-    answered = np.isfinite(chosen["forward_velocity"].values)
-    if HELD in beside and bool(np.isfinite(chosen[HELD].values[answered]).all()):
+    answered = np.isfinite(_flat(chosen, "forward_velocity", names))
+    if HELD in beside and bool(np.isfinite(_flat(chosen, HELD, names)[answered]).all()):
         known.insert(0, known.pop(known.index(HELD)))
     if STEADY_SPEED in beside:
         known.insert(0, STEADY_SPEED)
