@@ -16,7 +16,7 @@ _Record = TypeVar("_Record")
 def rows_of(table: str) -> list[dict[str, str]]:
     """Rows of a CSV file of this package, `folder/file.csv`, by the names in its head."""
     text = (Path(__file__).parent / table).read_text(encoding="utf-8")
-    return list(csv.DictReader(text.splitlines()))
+    return list(csv.DictReader(text.splitlines(), restval=""))
 
 
 def records_of(table: str, kind: type[_Record]) -> tuple[_Record, ...]:

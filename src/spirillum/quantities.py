@@ -22,6 +22,7 @@ class Quantity(NamedTuple):
     unit: str  #: SI unit; rates in rad/s.
     meaning: str  #: What it is, in half a sentence.
     source: str  #: Equation, table or reference.
+    short: str = ""  #: Name at the head of a narrow column, where it has one.
 
     @property
     def display_unit(self) -> str:

@@ -111,16 +111,6 @@ def _compare_with_published(item: Answer) -> str:
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
 """Rows that follow from others and are in the JSON only."""
-_SHORT = {
-    "forward_velocity": "speed",
-    "tail_rotation_rate": "tail",
-    "body_rotation_rate": "body",
-    "motor_current": "current",
-    "step_out_rate": "step-out",
-    "hydrodynamic_efficiency": "efficiency",
-    "tail_torque": "torque",
-}
-"""Names for the heads of narrow columns."""
 
 
 def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
@@ -144,7 +134,7 @@ def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
     rows = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "model")
     for name in names:
         unit = _common_unit(models, name)
-        rows.add_column(_SHORT[name] + (f"\n{unit}" if unit != "1" else ""), justify="right")
+        rows.add_column(QUANTITIES[name].short + (f"\n{unit}" if unit != "1" else ""), justify="right")
         if name == names[0]:
             rows.add_column(f"against\n{reference}", justify="right")
     for item in models:
@@ -297,21 +287,15 @@ def _final_values(answer: Answer) -> Iterator[tuple[str, Any]]:
             yield name, item
 
 
-_SWEPT = {
-    "field_rate": "field",
-    "tail_rotation_rate": "tail",
-    "forward_velocity": "speed",
-    "wobble_angle": "wobble",
-    "phase_lag": "lag",
-}
-"""Quantities of a sweep and the heads of their columns."""
+_SWEPT = ("field_rate", "tail_rotation_rate", "forward_velocity", "wobble_angle", "phase_lag")
+"""Quantities of a sweep."""
 
 
 def magnetic_sweep(answer: Answer) -> Blocks:
     """Motion over the rates of a rotating field."""
     title = f"{answer['robot']}: rotating field, model {answer['model']}, free motion"
     units = {name: QUANTITIES[name].display_unit for name in _SWEPT}
-    heads = [f"{word}, {units[name]}" for name, word in _SWEPT.items()]
+    heads = [f"{QUANTITIES[name].short}, {unit}" for name, unit in units.items()]
     yield grid(title, *heads, rows=series_rows(answer, units))
     yield from reason_of(answer)
     yield f"step-out in axial motion at {cell(answer['step_out_rate'], 'Hz')} Hz; no lag where the robot slips"
