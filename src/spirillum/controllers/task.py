@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from spirillum.answer_entries import content_of
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import Learner, Learning
@@ -226,19 +227,7 @@ class Scores:
                 for one in self.controllers
             },
             "failed_seeds": list(self.failed),
-            "runs": [
-                {
-                    "controller": one.controller,
-                    "seed": one.seed,
-                    "good": one.score.good,
-                    "error": quantity(one.score.error, unit),
-                    "energy": quantity(one.score.energy, "J"),
-                    "friction_factor": one.drawn.friction,
-                    "gap_factor": one.drawn.gap,
-                    "ended": one.ended,
-                }
-                for one in self.outcomes
-            ],
+            "runs": [content_of(one, unit=unit) for one in self.outcomes],
         }
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer_entries import answer_of
+from spirillum.answer_entries import answer_of, content_of
 from spirillum.arrays import Samples
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.designs.search import ConfirmedDesign
@@ -148,24 +148,16 @@ class Design(DisplayMixin):
                 name: quantity(value, named[name].unit, **self._ends(name)) for name, value in self.quantities.items()
             },
             compared=[
-                {
-                    "name": other.name,
-                    "design": self._fields(other.values),
-                    "objective": quantity(other.objective, unit),
-                    "keeps_conditions": other.keeps,
-                    "probability_that_the_design_is_better": quantity(
-                        other.beaten, "1", **interval(other.beaten_low, other.beaten_high, LEVEL)
-                    ),
-                }
+                content_of(
+                    other,
+                    design=self._fields(other.values),
+                    unit=unit,
+                    better=quantity(other.beaten, "1", **interval(other.beaten_low, other.beaten_high, LEVEL)),
+                )
                 for other in self.alternatives
             ],
             sensitivity={
-                profile.path: {
-                    "within_one_per_cent": quantity([profile.low, profile.high], profile.unit),
-                    "binds": profile.binds,
-                    "values": quantity(profile.values, profile.unit),
-                    "objective": quantity(profile.objective, unit),
-                }
+                profile.path: content_of(profile, flat=[profile.low, profile.high], of=unit)
                 for profile in self.profiles
             },
             trials=[
