@@ -7,8 +7,8 @@ track that no repetition shows, by the pixel, the stripes, the lamp, each state 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -108,6 +108,19 @@ def rounded_with_ends(value: float | None, low: float | None, high: float | None
     decimals = _decimals(number, 0.5 * (ends[1] - ends[0]))
     texts = [f"{round(item, decimals) + 0.0:.{decimals}f}" for item in (number, *ends)]  # + 0.0: no minus zero
     return ShownNumber(texts[0], texts[1], texts[2], read)
+
+
+def measured_rows(answer: Mapping[str, Any], names: Iterable[str]) -> list[dict[str, str]]:
+    """Rows of an answer's measured quantities for people: name, value, low, high, unit, trials, reason."""
+    return [
+        {
+            "name": name.replace("_", " "),
+            **rounded_with_ends(item["value"], item.get("low"), item.get("high"), item["unit"])._asdict(),
+            "trials": str(item.get("n", "")),
+            "reason": item.get("reason", ""),
+        }
+        for name, item in ((name, answer[name]) for name in names)
+    ]
 
 
 def _decimals(value: float, half_width: float) -> int:

@@ -28,8 +28,8 @@ from spirillum.measurement.measure import (
     measurement_of,
 )
 from spirillum.measurement.series import movement_of, observation_rows, series_of
-from spirillum.measurement.statistics import rounded_with_ends
-from spirillum.measurement.trials import MEASURED, Measured, Trial
+from spirillum.measurement.statistics import measured_rows
+from spirillum.measurement.trials import MEASURED, Trial
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures
 from spirillum.version import versions
 from spirillum.view.annotate import annotated_video, video_frame
@@ -69,7 +69,7 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
         title=f"{measurement.robot.name}: measured from video",
         setup=Path(measurement.setup).name,
         trials=[_trial_content(trial, pictures, thumbnails) for trial in measurement.trials],
-        summary=_rows(measurement.summary.quantities, measurement.summary.counts),
+        summary=measured_rows(measurement.summary.to_dict(), MEASURED),
         count=len(measurement.trials),
         failures=measurement.failures,
         interrupted=measurement.interrupted,
@@ -92,7 +92,7 @@ def _trial_content(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Ma
         "name": trial.name,
         "video": trial.video,
         "size": f"{track.time.size} frames, {span:.4g} s",
-        "rows": _rows(trial.quantities),
+        "rows": measured_rows(trial.to_dict(), MEASURED),
         "flags": trial.flags,
         "thumbnail": data_uri(data, "jpeg") if data else "",
         "shown": "A frame" if (flag := _flag_with_frame(trial)) is None else f"Frame {flag.frame} ({flag.name})",
@@ -123,19 +123,6 @@ def _aliasing(measurement: Measurement) -> str:
         f"What no camera can tell: a tail that turns faster or slower by whole multiples of {tail} looks the same from "
         f"frame to frame{also}. Where a rate is given, no sign of that was seen."
     )
-
-
-def _rows(quantities: Mapping[str, Measured], counts: Mapping[str, int] | None = None) -> list[dict[str, str]]:
-    """Rows of a table: name, value, low, high, unit, number of trials, and why value or interval is missing."""
-    return [
-        {
-            "name": name.replace("_", " "),
-            **rounded_with_ends(item.value, item.low, item.high, item.unit)._asdict(),
-            "trials": str(counts[name]) if counts else "",
-            "reason": item.reason,
-        }
-        for name, item in ((name, quantities[name]) for name in MEASURED)
-    ]
 
 
 def measure(  # noqa: PLR0913 - the options of the command

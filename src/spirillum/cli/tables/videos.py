@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from rich.markup import escape
 
@@ -18,7 +18,7 @@ from spirillum.cli.tables.parts import (
     sentences_of,
 )
 from spirillum.display import percent
-from spirillum.measurement.statistics import ShownNumber, rounded_with_ends
+from spirillum.measurement.statistics import measured_rows
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
 from spirillum.units import for_people, shown_in
 
@@ -79,15 +79,13 @@ def measurement(answer: Answer) -> Blocks:
     if several:
         table = grid(f"{answer['robot']}: {len(trials)} trials", "trial", "quantity", "value", "low", "high", "unit")
         for trial in trials:
-            for row, name in enumerate(RATE_NAMES):
-                whose = escape(trial["name"]) if row == 0 else ""
-                table.add_row(whose, name.replace("_", " "), *_numbers(trial[name]))
+            for number, cells in enumerate(_cells(trial, RATE_NAMES)):
+                table.add_row("" if number else escape(trial["name"]), *cells[:5])
         yield table
     title = "means over trials" if several else f"{answer['robot']}: {trials[0]['name']}"
     rows = grid(title, "quantity", "value", "low", "high", "unit", *(["trials"] if several else []))
-    for name, item in summary.items():
-        if isinstance(item, dict) and (item["value"] is not None or name in RATE_NAMES):
-            rows.add_row(name.replace("_", " "), *_numbers(item), *([str(item["n"])] if several else []))
+    for cells in _cells(summary, (n for n in MEASURED if n in RATE_NAMES or summary[n]["value"] is not None)):
+        rows.add_row(*(cells[:6] if several else cells[:5]))
     yield rows
     if summary["lateral_position"]["value"] is not None:
         shift = in_words(answer["lateral_shift_of_a_degree"])
@@ -116,8 +114,8 @@ def _intervals(answer: Answer, *, several: bool) -> Iterator[Detail]:
         yield Detail(f"no interval of {', '.join(names)}: {reason}")
 
 
-def _numbers(item: Answer) -> ShownNumber:
-    return rounded_with_ends(item["value"], item.get("low"), item.get("high"), item["unit"])
+def _cells(answer: Answer, names: Iterable[str]) -> Iterator[list[str]]:
+    return (list(row.values()) for row in measured_rows(answer, names))
 
 
 def feasibility(answer: Answer) -> Blocks:
@@ -175,7 +173,7 @@ def setup_proposal(answer: Answer) -> Blocks:
 def track(answer: Answer) -> Blocks:
     """Speed and rates over all frames of `track`, and its latency."""
     if "forward_velocity" in answer:
-        rows = ((name.replace("_", " "), *_numbers(answer[name])) for name in RATE_NAMES)
+        rows = (cells[:5] for cells in _cells(answer, RATE_NAMES))
         yield grid(f"{answer['source']}: all frames", "quantity", "value", "low", "high", "unit", rows=rows)
     seen = f"robot seen on {answer['frames_tracked']} of {answer['frames']} frames, {answer['frames_dropped']} dropped"
     latency = answer["latency"]
