@@ -168,16 +168,12 @@ class Control(DisplayMixin):
     def _display_content(self) -> tuple[dict[str, Any], None]:
         """See `DisplayMixin`: the task's error first, then every controller's scores."""
         answer = self.to_dict()
-        error, scores = answer.pop("error"), answer.pop("scores") or {}
+        error, scores = answer["error"], answer["scores"] or {}
         controllers = [{"controller": name, **one} for name, one in scores.get("controllers", {}).items()]
-        kept = {
-            name: item
-            for name, item in answer.items()
-            if name not in ("commands", "frames", "lab", "notes", "warnings")
-        }
+        left_out = ("error", "scores", "commands", "frames", "lab")
+        kept = {name: item for name, item in answer.items() if name not in left_out}
         verdict = "good enough" if self.score.good else "not good enough"
-        found = {**kept, error["meaning"]: error, "verdict": verdict, "controllers": controllers}
-        return {**found, "notes": answer["notes"], "warnings": answer["warnings"]}, None
+        return {**kept, error["meaning"]: error, "verdict": verdict, "controllers": controllers}, None
 
 
 def control(
