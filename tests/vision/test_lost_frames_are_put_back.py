@@ -108,6 +108,12 @@ def test_a_robot_that_stands_for_a_while_is_said_to(first: int, last: int, advic
     assert found.time is time
 
 
+def test_a_body_that_compression_holds_does_not_stand_where_no_tail_shows_it() -> None:
+    time, _, (tail, *others) = repeating([0 if 60 <= k < 90 else 1 for k in range(240)])
+    unread = tail._replace(values=np.full(time.size, np.nan))
+    assert "stands-for-a-while" not in restored(time, (unread, *others))[1]
+
+
 def test_of_several_rests_the_longest_is_said() -> None:
     time, _, readings = repeating([0 if k < 40 or k >= 180 else 1 for k in range(240)])
     found, _ = restored(time, readings)

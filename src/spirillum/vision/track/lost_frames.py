@@ -151,9 +151,10 @@ def _power(series: list[_Jumps]) -> float:
 
 def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...], *, unclear: bool) -> Flag | None:
     """Flag a video in which nothing moves for a while, or everything reverses; nothing is given if it is `unclear`."""
+    # The tail, which comes first, has to show it: compression holds a body that hardly moves where it is for a while.
     few = LOST_FRAMES.standing // 3
-    means = []
-    for reading in readings:
+    means: list[Samples] = []
+    for number, reading in enumerate(readings):
         known = np.flatnonzero(np.isfinite(reading.values))
         if known.size > 2 * LOST_FRAMES.standing:
             off = _wrapped(np.diff(reading.values[known]), reading.period) / np.diff(known)
@@ -164,6 +165,8 @@ def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...], *, uncle
             if usual > LOST_FRAMES.told * error / few:  # errors of steps cancel in a row
                 moving = mean[np.abs(mean) > LOST_FRAMES.still * usual]
                 means.append(mean / usual * np.sign(moving[0]))
+        if number == 0 and not means:
+            return None
     if len(means) < 2:
         return None
     over = sliding_window_view(np.array(means), LOST_FRAMES.standing - few + 1, axis=1)
