@@ -5,7 +5,7 @@ import pytest
 
 from spirillum.errors import InputError
 from spirillum.vision.camera.camera import scale_of
-from spirillum.vision.setup import load_setup
+from spirillum.vision.setup import Region, load_setup
 from spirillum.vision.track.assembly import FrameDetection, follow
 
 pytest.importorskip("av")
@@ -76,6 +76,14 @@ def test_only_the_scale(swimmer):
     sight, video = scale_of(path, setup)
     assert sight.scale.length_per_pixel == pytest.approx((0.2 - 0.015) / 350.0, rel=1e-3)
     assert video.size == (320, 240)
+
+
+def test_what_a_small_region_hides_is_said_to_be_looked_for_in_it_alone(swimmer):
+    _, path = swimmer
+    setup, robot = load_setup(path.with_name("a.setup.toml"))
+    setup = setup.model_copy(update={"region": Region(left=0, top=0, width=80, height=60)})
+    with pytest.raises(InputError, match="alone: make it larger, or leave it out"):
+        follow(path, setup, robot)
 
 
 def test_a_start_beyond_the_film_is_refused(swimmer):

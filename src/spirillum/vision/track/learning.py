@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -239,18 +240,32 @@ def _check_scale(video: Video, length_per_pixel: float, robot: Robot) -> None:
         )
 
 
+@contextmanager
+def _region_named(setup: Setup) -> Iterator[None]:
+    """Name the region of the setup where what is looked for is not found in it."""
+    try:
+        yield
+    except InputError as error:
+        if setup.region is None:
+            raise
+        words = "looked for in the [region] of the setup alone: make it larger, or leave it out"
+        raise InputError(f"{error} ({words})") from error
+
+
 def learnt_from(
     video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None, *, by_seal: bool = True
 ) -> InitialDetection:
     """Learn from some frames."""
     factor = reduction(video.size)
     still = background(frames, factor)
-    sight = sight_of(video, setup, still, folder, frames)
+    with _region_named(setup):
+        sight = sight_of(video, setup, still, folder, frames)
     _check_scale(video, sight.optics.length_per_pixel, robot)
     finder = BodyFinder(robot, sight.optics, bounds_of(setup, video))
     searched = searched_at(finder.shape().width, factor)
     still = still if searched == factor else background(frames, searched)
-    known = identify(video.name, setup, finder, frames, still, by_seal=by_seal)
+    with _region_named(setup):
+        known = identify(video.name, setup, finder, frames, still, by_seal=by_seal)
     poses = [known.start.expected(frame.time) for frame in frames]
     glare = standing_glare([frame.image for frame in frames], poses, known.start.body)
     known = known._replace(start=replace(known.start, seen=[]))  # what was learnt from is not needed any longer

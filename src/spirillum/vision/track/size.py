@@ -178,7 +178,7 @@ def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, rul
         remedy = "correct body.length and body.diameter of the robot file only where it lies on the body"
     else:
         why = "the tail says nothing of it" if np.isnan(tail) else "the tail agrees with neither"
-        remedy = "where it lies on the body, measure spacing, heights and body again"
+        remedy = "where it lies on the body, measure spacing, heights, index and body again"
     wider = scale if ruler else with_source(scale, "size of the body", off)
     far = off > (SIZE.largest_difference if ruler else SIZE.unconfirmed)
     name = "outline-far-off" if far else "outline-does-not-fit"
