@@ -130,7 +130,7 @@ def test_sampler_wants_whole_numbers() -> None:
 
 def test_sentence_says_what_is_allowed() -> None:
     for wrong, words in (
-        ({"calibration": 3}, "calibration = 3; allowed: text, a path, a Fit or None"),
+        ({"calibration": 3}, "calibration = 3; allowed: text, a path or None"),
         ({"placement": 1.0}, "placement = 1.0; allowed: a Placement, a mapping of names or None"),
         ({"placement": {1: 2}}, "placement = {1: 2}; allowed: a Placement, a mapping of names or None"),
         ({"calibrated": "no"}, "calibrated = 'no'; allowed: True or False"),
