@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BeforeValidator
 
@@ -29,14 +29,11 @@ _AngleNoise = Annotated[Angle, AfterValidator(_not_negative)]
 _Share = Annotated[float, BeforeValidator(in_range(0.0, 0.95))]
 
 
-class CameraModel(Options):
+class CameraModel(Options, argument="camera", prefixed=True):
     """The camera: when it sees, and how it errs: normal errors of each frame, and slow ones with a memory.
 
     The sizes are those of the tracker on degraded films of the virtual camera, see `docs/control-background.md`.
     """
-
-    argument: ClassVar[str] = "camera"
-    prefixed: ClassVar[bool] = True
 
     fps: Annotated[float, BeforeValidator(in_range(0.1, 1000.0, " frames a second"))] = 30.0  #: Frames a second.
     latency: _Delay = 0.1  #: From a frame's exposure until the controller has its numbers.
@@ -57,11 +54,8 @@ class CameraModel(Options):
     memory: _Period = 1.0  #: Correlation time of the slow errors.
 
 
-class Meter(Options):
+class Meter(Options, argument="meter", prefixed=True):
     """Motor current and battery voltage, as a circuit on board would send them; the paper's robot has none."""
-
-    argument: ClassVar[str] = "meter"
-    prefixed: ClassVar[bool] = True
 
     rate: Annotated[float, BeforeValidator(in_range(0.0, 1000.0, " readings a second"))] = 10.0
     """Readings a second; 0: no meter."""
@@ -73,25 +67,19 @@ class Meter(Options):
     """Relative standard deviation of the gain of current and of voltage, one value each for a whole run."""
 
 
-class Remote(Options):
+class Remote(Options, argument="remote", prefixed=True):
     """What carries commands to the robot: unidirectional, repeated, and some are lost.
 
     The defaults are those of common infrared remotes: a message lasts 68 ms and is repeated every 108 ms (NEC code).
     """
-
-    argument: ClassVar[str] = "remote"
-    prefixed: ClassVar[bool] = True
 
     period: _Period = 0.108  #: Between two commands; a controller decides once in a period.
     delay: _Delay = 0.068  #: From the decision until the drive follows.
     lost: _Share = 0.05  #: Share of commands that never arrive, each by itself; the drive then keeps the last one.
 
 
-class Pulse(Options):
+class Pulse(Options, argument="pulse", prefixed=True):
     """A pulse of flow through the tube: the mean flow is imposed for a while, then the ends are as before."""
-
-    argument: ClassVar[str] = "pulse"
-    prefixed: ClassVar[bool] = True
 
     velocity: Velocity = 5e-4  #: Mean flow while it lasts; 0: no pulse.
     duration: Time = 2.0  #: How long it lasts.
@@ -99,11 +87,8 @@ class Pulse(Options):
     """When it begins; None: sampled uniformly over the first nine tenths of the run, with a random sign."""
 
 
-class Unknown(Options):
+class Unknown(Options, argument="unknown", prefixed=True):
     """Robot parameters unknown to the controller; each run samples them anew."""
-
-    argument: ClassVar[str] = "unknown"
-    prefixed: ClassVar[bool] = True
 
     friction_factor: Annotated[float, BeforeValidator(in_range(1.0, 100.0))] = 3.0
     """The true friction is the robot's times a factor from 1/this to this, evenly in its logarithm; 1: known."""

@@ -63,11 +63,9 @@ class Score:
     energy: float  #: From the battery's terminals (without a motor: of the drive), J.
 
 
-class Task(Options):
+class Task(Options, argument="task", prefixed=True):
     """What a robot has to do."""
 
-    argument: ClassVar[str] = "task"
-    prefixed: ClassVar[bool] = True
     kind: ClassVar[str]
     error_name: ClassVar[str]  #: What `Score.error` is, in words.
     error_unit: ClassVar[str]  #: SI.

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Annotated, ClassVar, Literal, NamedTuple, cast
+from typing import Annotated, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
@@ -24,10 +24,8 @@ from spirillum.swimming.motions import STEADY
 from spirillum.units import Kind, as_given, display_unit, in_unit, parse_option, show
 
 
-class Judged(Options):
+class Judged(Options, argument="judged"):
     """Statistics of designs under uncertainty."""
-
-    argument: ClassVar[str] = "judged"
 
     statistic: Literal["mean", "quantile"] = "mean"
     """Of the objective over the draws: its mean, or the quantile of its worse end."""
@@ -147,11 +145,8 @@ def _kind(unit: str) -> Kind:
     return Kind(f"quantity in {unit}", plain, f"1 {unit}", f"-1e12 {plain}", f"1e12 {plain}")
 
 
-class Manufacturability(Options):
+class Manufacturability(Options, argument="bench", prefixed=True):
     """How tightly a wire is wound, and how far the tail stays off the glass."""
-
-    argument: ClassVar[str] = "bench"
-    prefixed: ClassVar[bool] = True
 
     mandrel: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
     """Least bending diameter of the wire, in wire diameters (IEC 60851-3, mandrel winding)."""

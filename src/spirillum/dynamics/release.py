@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -38,11 +38,8 @@ _LARGEST = 64 << 20
 _LIMITS = dict(zip(FLOW_COLUMNS, ((0.0, 1e9), (-1e6, 1e6)), strict=True))
 
 
-class InTube(Options):
+class InTube(Options, argument="in_tube", prefixed=True):
     """Start, surroundings and contact of a run in a tube, beside its placement."""
-
-    argument: ClassVar[str] = "in_tube"
-    prefixed: ClassVar[bool] = True
 
     azimuth: Angle = 0.0
     """Azimuth of the body's centre about +x from the lowest point of the tube.

@@ -13,7 +13,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -49,11 +49,8 @@ if TYPE_CHECKING:
 _A = TypeVar("_A", bound=FreeRobot)
 
 
-class Field(Options):
+class Field(Options, argument="field", prefixed=True):
     """Settings of the coils from now on; what is not given stays as it was."""
-
-    argument: ClassVar[str] = "field"
-    prefixed: ClassVar[bool] = True
 
     rotation_rate: Rate | None = None  #: Rotation rate of the field about its axis.
     yaw: Yaw | None = None

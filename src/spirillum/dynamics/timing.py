@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -105,10 +105,8 @@ class Timetable(NamedTuple):
     notes: list[Note]  #: Where the schedule of the remote and the run do not meet, a sentence each.
 
 
-class Timing(Options):
+class Timing(Options, argument="timing"):
     """Length, sampling and remote control of a run; a turn is one of the tail at its steady rate, or of the field."""
-
-    argument: ClassVar[str] = "timing"
 
     turns: Annotated[float, BeforeValidator(in_range(_SHORTEST, 1e5))] = 3.0
     """Length of the run in turns of the tail, or of the field (the paper's three periods; free in a tube: 20 s)."""

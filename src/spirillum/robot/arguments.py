@@ -21,8 +21,13 @@ class Options(Section):
     In a file they are a table, in Python one argument, on the command line options of the same names.
     """
 
-    argument: ClassVar[str] = "options"  #: Name of the argument that takes them.
+    argument: ClassVar[str] = "options"  #: Name of the argument that takes them; a keyword of the class.
     prefixed: ClassVar[bool] = False  #: Whether sentences name a field with its argument, as in `placement.gap`.
+
+    def __init_subclass__(cls, *, argument: str = "", prefixed: bool = False, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        if argument:
+            cls.argument, cls.prefixed = argument, prefixed
 
     @classmethod
     def of(cls, value: Self | Mapping[str, Any] | None) -> Self:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -106,10 +106,8 @@ class ModelOptions(Section):
         return ""
 
 
-class Resolution(Options):
+class Resolution(Options, argument="resolution"):
     """Numerical resolution of the models `slender` and `tube`; None keeps the robot's own option."""
-
-    argument: ClassVar[str] = "resolution"
 
     accuracy: Annotated[Accuracy, BeforeValidator(one_of("standard", "high"))] | None = None
     """Of `slender` and `tube`: form of the wire and resolution of the surfaces, `standard` or `high`."""

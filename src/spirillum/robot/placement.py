@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -22,16 +22,13 @@ def gap_on_asperities(roughness: Samples | float) -> Samples:
     return found
 
 
-class Placement(Options):
+class Placement(Options, argument="placement", prefixed=True):
     """Position and attitude of a robot in its channel, for models that compute the walls; frozen, SI inside.
 
     The channel is horizontal, the body's mid-length lies in the vertical plane through the channel's axis, and without
     yaw so does the robot's axis. What is None was left open: a model then takes its own default, or answers with a band
     over what is open.
     """
-
-    argument: ClassVar[str] = "placement"
-    prefixed: ClassVar[bool] = True
 
     gap: Length | None = None  #: Smallest distance between the body's surface and the glass.
     eccentricity: Annotated[float | None, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = None

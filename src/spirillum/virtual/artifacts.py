@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -23,10 +23,8 @@ _JITTER = 1.0 / 3.0  # standard deviation of the jitter from frame to frame over
 _TURN = 2e-4  # roll of a hand-held camera over its sway, rad per pixel; assumed
 
 
-class Degradation(Options):
+class Degradation(Options, argument="degradation"):
     """Amounts of the disturbances of a video; the defaults are a clean one's."""
-
-    argument: ClassVar[str] = "degradation"
 
     noise: Annotated[float, BeforeValidator(in_range(0.0, 64.0))] = 0.0
     """Standard deviation of the noise, in steps of 255; independent in every pixel and colour."""
@@ -76,10 +74,8 @@ _PRESETS: dict[str, dict[str, Any]] = {
 """Named degradations; `degraded` is what measuring is tested with."""
 
 
-class Troubles(Options):
+class Troubles(Options, argument="troubles"):
     """Amounts of the artifacts of a video; the defaults are none."""
-
-    argument: ClassVar[str] = "troubles"
 
     lost_frames: Annotated[float, BeforeValidator(in_range(0.0, 0.5))] = 0.0
     """Share of frames that are lost while the film's times go on evenly, as simple recording scripts write them."""

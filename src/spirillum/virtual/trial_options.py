@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
@@ -44,10 +44,8 @@ def _read_frame_rate(value: Any) -> float:
     return float(Fraction(in_range(1.0, 1000.0, " frames a second")(value)).limit_denominator(1001))
 
 
-class MotionOptions(Options):
+class MotionOptions(Options, argument="motion"):
     """Steady swimming: a model's rates, and those that are prescribed instead."""
-
-    argument: ClassVar[str] = "motion"
 
     model: str | None = None
     """Hydrodynamic model; None: the study's first, without a study the one that `predict` answers with."""
@@ -57,10 +55,8 @@ class MotionOptions(Options):
     body_rate: Rate | None = None  #: Lab rotation rate of the body instead of the model's.
 
 
-class TrialOptions(Options):
+class TrialOptions(Options, argument="trial"):
     """Length of a trial, and the robot's pose at its first frame."""
-
-    argument: ClassVar[str] = "trial"
 
     duration: Time | None = None  #: Of the video; None: 20 s, of a run its length.
     start: SignedLength | None = None
@@ -76,10 +72,8 @@ class TrialOptions(Options):
     (0.5 mm for the paper's body). A run has its own."""
 
 
-class CameraOptions(Options):
+class CameraOptions(Options, argument="camera"):
     """The camera of a trial."""
-
-    argument: ClassVar[str] = "camera"
 
     view: Annotated[Literal["top", "side"], BeforeValidator(one_of("top", "side"))] = "top"
     """From the `top`, or level from the `side` of the tank."""
@@ -113,10 +107,8 @@ class CameraOptions(Options):
         return self.direction == "left"
 
 
-class SetupErrors(Options):
+class SetupErrors(Options, argument="setup_errors"):
     """Errors planted in the setup; the video does not have them."""
-
-    argument: ClassVar[str] = "setup_errors"
 
     depth_error: SignedLength = 0.0  #: Planted error of the setup's height of the robot's axis.
     depth_uncertainty: LengthOrZero = 0.0  #: Standard uncertainty of that height in the setup.
