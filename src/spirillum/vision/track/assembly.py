@@ -35,12 +35,12 @@ from spirillum.vision.track.track import CUES, Agreement, RobotMotion, Track, ag
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, static_object_flag, unwrapped
 from spirillum.vision.track.visibility import (
     cut_off,
+    false_detection_flag,
+    false_detections,
     far_apart,
     gaps_of,
     marks_lost_flag,
     sight_flags,
-    something_else,
-    something_else_flag,
 )
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
@@ -123,7 +123,7 @@ def track_of(
     told = seen & ~cut & (body.seal is None)  # a nose of glass shows what lies under it; against the seal, cues decide
     elongation = np.where(told, [one.elongation for one in record.placed], np.nan)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
-    other = something_else(time, pose, (roll, tail), body.robot.body.length, optics.length_per_pixel)
+    other = false_detections(time, pose, (roll, tail), body.robot.body.length, optics.length_per_pixel)
     pose[other] = errors[other] = elongation[other] = np.nan
     position = positions_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     along = AlignedTrack(position, pose[:, 2], ())
@@ -147,7 +147,7 @@ def track_of(
         roll_flags = (*roll_flags, Flag.named("outline-and-stripes-off" if roll_error else "scale-does-not-fit"))
     motion, pixel = RobotMotion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     lost = marks_lost_flag(pose[:, 0], roll[:, 0], tail[:, 0], learnt=known.robot and known.wire.readable)
-    seen_flags = (*seen_flags, *something_else_flag(other), *lost)
+    seen_flags = (*seen_flags, *false_detection_flag(other), *lost)
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     agreement = _agreement(time, record, cut | other, pixel, outline.suspect)
     lag = math.hypot(agreement.drift, _colour_lag(position[:, 0], body), outline.drift * pixel)

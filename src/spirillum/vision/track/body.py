@@ -122,7 +122,7 @@ class BodyFinder:
         if self.seal is not None:  # what does not move along with the seal is not the body's
             found = self._learn_seal(parts, poses)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
-            poses = _smooth(poses, times, SEAL.beside_path)
+            poses = _smooth(poses, times, SEAL.off_path)
         for turn in range(OUTLINE.learning_rounds if self.seal is None else SEAL.joint_rounds):
             stack = [self._profiles(part, pose) for part, pose in zip(parts, poses, strict=True)]
             self._learn_profiles(np.stack(stack))

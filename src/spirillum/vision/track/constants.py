@@ -44,7 +44,7 @@ class SealConstants:
     least_score: float = 12.0
     """Least difference of colour between a seal and its surroundings, of 255; of videos without one it was below 6."""
     clear_share: float = 0.7  #: Least share of the frames on which it is found and its edges fit.
-    beside: float = 3.0  #: Distance from an edge from which on colours are those of one side, pixels.
+    clear_distance: float = 3.0  #: Distance from an edge from which on colours are those of one side, pixels.
     edge_blur: float = 1.2  #: Standard deviation of the blur of an edge to begin with, pixels.
     floors: tuple[float, float] = (0.1, 0.3)  #: Least standard error of an edge at ends and silhouettes, pixels.
     noise: float = 6.0  #: Standard deviation of the noise of a colour, of 255.
@@ -87,7 +87,7 @@ class SealConstants:
     """Share of the edges of the nose, which give the robot's displacement, that have to move with the seal, too."""
     apart: float = 0.3
     """Standard deviation between places by the outline alone and by the seal from which on they disagree, pixels."""
-    beside_path: tuple[float, float, float] = (2e-3, 5e-4, 0.1)
+    off_path: tuple[float, float, float] = (2e-3, 5e-4, 0.1)
     """Distances from the robot's path, along and across, m, and heading, rad, from which on a pose took something else,
     such as a stripe, for the seal's side."""
     moves: int = 1  #: Times that its edges are learnt again where the outline lies.
@@ -186,7 +186,7 @@ class SetupFreeConstants:
     """Least correlation of the brightness of neighbouring pixels in the static background: below it is noise alone."""
     along: int = 160  #: Places along the channel at which its walls are looked for.
     widest: float = 2.2  #: Farthest wall from the robot, over the body's diameter.
-    beside: float = 0.55  #: Nearest wall, over the body's diameter.
+    nearest_wall: float = 0.55  #: Nearest wall, over the body's diameter.
     seen: float = 0.5  #: Share of a line along the channel that has to be in the picture.
     paper: float = 0.15  #: Width of a ruler's paper beside its lines, over the body's diameter.
     faintest: float = 0.3  #: Least usual step of the brightness from row to row, of 255.
@@ -205,7 +205,7 @@ class StandingConstants:
     stride: int = 4  #: Every how many frames one is looked at before all of them are.
     ahead: float = 0.5
     """Width of the surroundings before its nose and behind its tail that are searched, over the body's length."""
-    beside: float = 1.0  #: Half width of these surroundings, over the body's diameter.
+    half_width: float = 1.0  #: Half width of these surroundings, over the body's diameter.
     moved: float = 0.1  #: Largest displacement along the channel of a robot that stands, pixels.
     turned: float = radians(1.0)  #: Largest rotation of its body and of its tail, rad.
     blur: float = 2.0  #: Standard deviation of the blur under which pictures are compared with their background, pixels

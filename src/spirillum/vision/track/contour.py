@@ -119,8 +119,8 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     sides = _sides(robot, outlines, spacing)
     kinds = [("front", "outline", wide.size), ("rear", "seal" if striped else "outline", behind.size)]
     cues = {"striped_side": "seal", "coupling": "coupling"}
-    for beside in ("left", "right"):
-        kinds += [(beside, cues.get(kind, "outline"), stations.size) for _, kind, stations in sides]
+    for flank in ("left", "right"):
+        kinds += [(flank, cues.get(kind, "outline"), stations.size) for _, kind, stations in sides]
     kinds.append(("seal", "seal", len(seal)))
     sizes = [size for _, _, size in kinds]
     count = sum(sizes)

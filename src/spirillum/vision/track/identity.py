@@ -186,10 +186,10 @@ def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
 def _surroundings(body: BodyFinder, pose: BodyPose) -> tuple[int, int, int, int]:
     """Part of the picture about a robot, and about the path of one that hardly moves: left, top, right, bottom."""
     robot = body.robot
-    beside = STANDING.beside * robot.body.diameter
+    half_width = STANDING.half_width * robot.body.diameter
     ahead = (0.5 + STANDING.ahead) * robot.body.length
     behind = ahead + robot.coupling.length + robot.tail.length
-    corners = [[x, y, 0.0] for x in (-behind, ahead) for y in (-beside, beside)]
+    corners = [[x, y, 0.0] for x in (-behind, ahead) for y in (-half_width, half_width)]
     pixels = project(np.array(corners), pose, body.optics)
     if not np.isfinite(pixels).all():
         return 0, 0, 0, 0

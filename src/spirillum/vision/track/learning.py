@@ -44,7 +44,7 @@ class GlareConstants:
     passes: float = 2.0  #: Least change of the distance of such an edge from a spot, within its rim, pixels.
     fewest: int = 3  #: Fewest edge points of which this is true.
     drift: float = 0.08  #: Standard error of the displacement from end to end, pixels.
-    beside: tuple[float, float] = (0.6, 0.85)
+    lateral_distances: tuple[float, float] = (0.6, 0.85)
     """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
     lines: int = 5  #: Lines along the path between these distances.
     veil_width: float = 0.3
@@ -105,15 +105,15 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
     first, last = x.min() - middle.x - behind, x.max() - middle.x + 0.5 * robot.body.length
     wide = max(4, round(GLARE.veil_width * robot.body.diameter / pixel))
     along = np.arange(first - wide * pixel, last + wide * pixel, pixel)
-    sides = [side * np.linspace(*GLARE.beside, GLARE.lines) * robot.body.diameter for side in (1.0, -1.0)]
+    sides = [side * np.linspace(*GLARE.lateral_distances, GLARE.lines) * robot.body.diameter for side in (1.0, -1.0)]
     profiles = [_brightness(images, middle, body, along, across) for across in sides]
     if any(profile is None or profile.size <= 4 * wide for profile in profiles):
         return None
     place, size = _common_step(*(_sharp_steps(profile, wide) for profile in profiles if profile is not None))
     if size < GLARE.veil_step:
         return None
-    there, beside = float(along[place]), float(sides[0].mean())
-    u, v = project(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
+    there, lateral = float(along[place]), float(sides[0].mean())
+    u, v = project(np.array([[there, lateral, 0.0]]), middle, body.optics)[0]
     return Glare(GLARE.veil_drift, (Flag.named("standing-reflection", step=size, u=u, v=v),))
 
 

@@ -106,7 +106,7 @@ class SealEdges:
     def _learn_ground(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
         """Learn how colours vary beside the silhouettes: a line of a grid that lies along one is no stripe's edge."""
         flanks = np.concatenate(self._sides[1:3])
-        offsets, found = np.arange(SEAL.beside, SEAL.ground, 1.0), []
+        offsets, found = np.arange(SEAL.clear_distance, SEAL.ground, 1.0), []
         for part, (pixels, normals) in zip(parts, places, strict=True):
             colours = np.empty((3, flanks.size, offsets.size))
             profiles_across(part.picture, part.origin, pixels[flanks], normals[flanks], offsets, colours)
@@ -156,14 +156,14 @@ class SealEdges:
         colours, count = self._colours(part, pixels, normals), len(pixels)
         share, distance, kind = np.empty(colours.shape[1:]), np.empty(count), np.empty(count, dtype=np.int64)
         palette = np.empty((0, 3)) if self._palette is None else self._palette
-        limits = SEAL.beside, SEAL.distinct, STRIPES.white, SEAL.fewest_of_kind, SEAL.pooled
+        limits = SEAL.clear_distance, SEAL.distinct, STRIPES.white, SEAL.fewest_of_kind, SEAL.pooled
         known = colours, self._offsets, self._ends, palette, self._ground
         seal_shares(*known, *limits, np.empty((2, 3, count)), share, distance, kind)
         return _Profiles(share, distance, kind)
 
     def _rows(self, flank: bool) -> slice:  # noqa: FBT001 - of `_FLANKS`
         """Samples of a profile that are used: before the colours are known, the outermost stripe at a silhouette."""
-        first = int(OUTLINE.half_profile - SEAL.beside) if flank and self._palette is None else 0
+        first = int(OUTLINE.half_profile - SEAL.clear_distance) if flank and self._palette is None else 0
         return slice(first, None)
 
     def _areas(self, share: Samples) -> Samples:

@@ -312,7 +312,7 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
                 steps[sign * across > float(beyond.min()) - SETUP_FREE.paper * diameter] = np.nan
     usual = float(np.nanmedian(steps)) + SETUP_FREE.faintest
     left, right = (
-        np.flatnonzero((sign * across > SETUP_FREE.beside * diameter) & (steps > 0.0)) for sign in (-1.0, 1.0)
+        np.flatnonzero((sign * across > SETUP_FREE.nearest_wall * diameter) & (steps > 0.0)) for sign in (-1.0, 1.0)
     )
     fainter = np.minimum(steps[left][:, None], steps[right]) / usual
     width, off = across[right] - across[left][:, None], np.abs(across[right] + across[left][:, None])

@@ -29,7 +29,7 @@ class FollowingConstants:
     search_interval: int = 15  #: Frames between two searches of the whole picture for a robot that was lost.
     memory: int = 12  #: Frames from which the next place is predicted.
     largest_jump: float = 4.0  #: Largest accepted distance from the predicted position, pixels.
-    beside: float = 1.5
+    lateral_deviation: float = 1.5
     """Distance across the channel from where it should be from which on that place is compared, pixels: the sides of
     stripes look like those of the body, and cross it as it turns."""
     gap: float = 3.0  #: Time between frames over the usual one from which the robot may have left its predicted path.
@@ -130,7 +130,7 @@ class FrameTracker:
         if guess is not None:
             found = self._after_a_gap(frame, guess) if self._is_after_a_gap(frame.time, guess) else None
             found = found or self._near(frame, guess)
-            far = FOLLOWING.beside * self.known.start.body.optics.length_per_pixel
+            far = FOLLOWING.lateral_deviation * self.known.start.body.optics.length_per_pixel
             if found.known and abs(found.pose.y - expected.y) <= far:
                 return found
         again = self._near(frame, expected)

@@ -149,7 +149,7 @@ class FalseDetectionConstants:
 
     fewest: int = 12  #: Fewest frames on which stripes or tail are read.
     shortest: int = 3  #: Fewest frames in a row without them.
-    beside: int = 5  #: Frames to both sides of a jump whose medians are compared.
+    neighbours: int = 5  #: Frames to both sides of a jump whose medians are compared.
     jump: float = 0.15  #: Jump of the place over the body's length.
     leaves: float = 1.0
     """Distance from the path of the marked frames from which on the outline has left the robot, pixels."""
@@ -162,7 +162,7 @@ class FalseDetectionConstants:
 FALSE_DETECTION = FalseDetectionConstants()
 
 
-def something_else(
+def false_detections(
     time: Samples, pose: Samples, marks: tuple[Samples, Samples], length: float, pixel: float
 ) -> np.ndarray:
     """Frames of stretches without marks that lie beside the path of those with marks, or jump to them, a mask, (n,).
@@ -184,21 +184,21 @@ def something_else(
     along = place - speed * (time - time[0])[:, None]  # what does not move as the robot does jumps, or leaves it
     path = np.median(along[sure], axis=0)
     scatter = float(np.hypot(*mad_scale(along[sure] - path, axis=0)))
-    beside_path = max(FALSE_DETECTION.leaves * pixel, FALSE_DETECTION.scatters * scatter)
+    off_path = max(FALSE_DETECTION.leaves * pixel, FALSE_DETECTION.scatters * scatter)
     for stretch in stretches_of(~marked & known):
-        beside = sure[(sure > stretch[-1]) | (sure < stretch[0])]
-        after, before = beside[beside > stretch[-1]], beside[beside < stretch[0]]
-        few = FALSE_DETECTION.beside
+        others = sure[(sure > stretch[-1]) | (sure < stretch[0])]
+        after, before = others[others > stretch[-1]], others[others < stretch[0]]
+        few = FALSE_DETECTION.neighbours
         sides = [(stretch[-few:], after[:few]), (stretch[:few], before[-few:])]
         jumps = [np.median(along[own], axis=0) - np.median(along[other], axis=0) for own, other in sides if other.size]
-        leaves = [np.hypot(*(np.median(along[own], axis=0) - path)) > beside_path for own, _ in sides]
+        leaves = [np.hypot(*(np.median(along[own], axis=0) - path)) > off_path for own, _ in sides]
         jumps_to_it = all(np.hypot(*jump) > FALSE_DETECTION.jump * length for jump in jumps)
         if stretch.size >= FALSE_DETECTION.shortest and (jumps_to_it or any(leaves)):
             found[stretch] = True
     return found
 
 
-def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
+def false_detection_flag(found: np.ndarray) -> tuple[Flag, ...]:
     """Note on such frames."""
     if not found.any():
         return ()
@@ -224,18 +224,18 @@ def far_apart(time: Samples, x: Samples, length: float) -> tuple[Flag, ...]:
         x: along the channel, m, (n,); NaN where unknown.
         length: of the body, m.
     """
-    known, few, allowed = np.flatnonzero(np.isfinite(x)), FALSE_DETECTION.beside, FALSE_DETECTION.apart * length
+    known, few, allowed = np.flatnonzero(np.isfinite(x)), FALSE_DETECTION.neighbours, FALSE_DETECTION.apart * length
     if known.size < 2 * few:
         return ()
     t, place = time[known], x[known]
     speed = float(np.median(np.diff(place) / np.diff(t)))
-    beside = place - speed * t
-    level = np.median(sliding_window_view(beside, few), axis=1)
+    residual = place - speed * t
+    level = np.median(sliding_window_view(residual, few), axis=1)
     unseen = t[few : 1 - few] - t[few - 1 : -few]
     steps = np.abs(level[few:] - level[:-few]) - abs(speed) * unseen  # it may have stopped while it was not seen
     largest = int(np.argmax(steps))
     if steps[largest] <= allowed or abs(level[-1] - level[0]) <= allowed:
         return ()
-    around = np.abs(np.diff(beside[largest : largest + 2 * few]))
+    around = np.abs(np.diff(residual[largest : largest + 2 * few]))
     frame = int(known[largest + 1 + np.argmax(around)])
     return (Flag.named("two-places", frame, apart=show(float(steps[largest]), "mm"), time=time[frame]),)

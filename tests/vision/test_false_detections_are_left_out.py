@@ -6,7 +6,7 @@ A robot at two places has no speed.
 import numpy as np
 import pytest
 
-from spirillum.vision.track.visibility import far_apart, marks_lost_flag, something_else, something_else_flag
+from spirillum.vision.track.visibility import false_detection_flag, false_detections, far_apart, marks_lost_flag
 
 LENGTH, PIXEL = 0.04, 2.5e-4
 TIME = np.arange(150) / 30.0
@@ -22,7 +22,7 @@ def way(seed: int = 0) -> np.ndarray:
 def other(place: np.ndarray, marked: np.ndarray) -> np.ndarray:
     """What is found where stripes are read on the marked frames, and the tail on none."""
     stripes = np.where(marked[:, None], 0.1, np.nan) * np.ones(2)
-    return something_else(TIME, place, (stripes, np.full(stripes.shape, np.nan)), LENGTH, PIXEL)
+    return false_detections(TIME, place, (stripes, np.full(stripes.shape, np.nan)), LENGTH, PIXEL)
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 100), (110, 150)])
@@ -33,7 +33,7 @@ def test_a_stretch_beside_the_robot_is_found(first: int, last: int, off: tuple[f
     marked[first:last] = False
     found = other(place, marked)
     assert np.flatnonzero(found).tolist() == list(range(first, last))
-    assert f"on {last - first} frames" in something_else_flag(found)[0].sentence
+    assert f"on {last - first} frames" in false_detection_flag(found)[0].sentence
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 100), (110, 150)])
@@ -42,7 +42,7 @@ def test_the_robot_without_marks_stays(first: int, last: int) -> None:
     place, marked = way(), np.ones(TIME.size, dtype=bool)
     marked[first:last] = False
     assert not other(place, marked).any()
-    assert something_else_flag(np.zeros(3, dtype=bool)) == ()
+    assert false_detection_flag(np.zeros(3, dtype=bool)) == ()
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 120), (90, 150)])
