@@ -112,3 +112,24 @@ def test_what_was_derived_is_not_counted_as_measured(tmp_path: Path) -> None:
     found = observations_answer(path)
     assert found["rows"] == 2
     assert found["measured"] == {"forward_velocity": 0, "tail_rate": 2, "body_rate": 2, "motor_rate": 1}
+
+
+def test_what_a_trial_states_of_one_of_its_measurements_counts(made: Callable[..., Path], tmp_path: Path) -> None:
+    """Whichever the ratio's parts it is; the answer says the error that the fit takes."""
+    header, rows = _cells(made(**SMALL, seed=12))
+    found = {}
+    for column in ("", "forward_velocity_mm_s", "tail_rate_Hz"):
+        of = header.index(column) if column else 0
+        lines = [f"{','.join(header)},{column or 'tail_rate_Hz'}_ci95"]
+        lines += [",".join([*row, f"{0.5 * float(row[of])}" if column else ""]) for row in rows]
+        (tmp_path / "o.csv").write_text("\n".join(lines) + "\n")
+        found[column] = sp.calibrate(tmp_path / "o.csv", WIDE, method="least-squares", model="sbt")
+    widths = {name: one.values["body_drag"].high - one.values["body_drag"].low for name, one in found.items()}
+    errors = {name: one.to_dict()["error_of_a_trial"]["advance"]["value"] for name, one in found.items()}
+    for column in ("forward_velocity_mm_s", "tail_rate_Hz"):
+        assert widths[column] > 2.0 * widths[""]
+        assert errors[column] == pytest.approx(0.5 / 1.96, rel=1e-3)
+    assert errors[""] == pytest.approx(found[""].error["advance"])
+    reach = {name: one.friction_given[0].high - one.friction_given[0].low for name, one in found.items()}
+    assert reach["tail_rate_Hz"] > 2.0 * reach[""]  # the motor's rate is the tail's less the body's
+    assert reach["forward_velocity_mm_s"] == pytest.approx(reach[""], rel=0.3)

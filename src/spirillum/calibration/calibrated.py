@@ -56,7 +56,7 @@ class Calibrated(DisplayMixin):
     friction_statement: str  #: What the intervals of B_eff take as exact, in a sentence; empty where there is no B_eff.
     predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
     """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
-    error: dict[Quantity, float]  #: Relative error of one trial.
+    error: dict[Quantity, float]  #: Relative error of one trial, from the scatter of trials.
     warnings: tuple[Note, ...]
     discrepancy: dict[Quantity, Estimate] = field(default_factory=dict)
     """Relative misfit of the model by robot, beyond the scatter of trials; empty by the method 'paper'."""
@@ -76,6 +76,11 @@ class Calibrated(DisplayMixin):
     def experiment(self) -> Experiment:
         """The observations."""
         return self.problem.experiment
+
+    @property
+    def typical_error(self) -> dict[Quantity, float]:
+        """Relative error of one trial in the fit, at least what trials state: root mean square over the robots."""
+        return {name: self.problem.ratio(name).typical_error(error) for name, error in self.error.items()}
 
     @property
     def friction_exact(self) -> dict[str, float]:

@@ -59,6 +59,12 @@ class Ratio:
         """Standard error of each mean, SI, from the relative error of one trial; NaN where it is unknown."""
         return error_of_mean(error, self.stated, self.scale, self.trials)
 
+    def typical_error(self, error: float) -> float:
+        """Root mean square over the robots of one trial's relative error; NaN where none is known."""
+        used = np.fmax(error, self.stated)[self.is_observed]
+        known = used[np.isfinite(used)]
+        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
     def sampled_error(self, count: int, rng: np.random.Generator) -> Samples:
         """Draws of the relative error of one trial, given the scatter, (count, 1); NaN without repeated trials."""
         # Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.
@@ -295,6 +301,8 @@ def _ratios(path: Path, items: Sequence[ObservationRow], hand: float) -> _Seen:
         found = _of_a_mean(items[0], velocity[0], tail[0], body[0], motor[0], by_motor=by_motor)
     else:
         halves = np.array([item.intervals for item in items]).T
+        of_one = np.where([item.motor_derived for item in items], np.fmax(*halves[1:3]), np.nan)
+        halves[3] = np.where(np.isnan(halves[3]), of_one, halves[3])
         with np.errstate(divide="ignore", invalid="ignore"):
             u, w, b, m = halves / NORMAL / np.abs((velocity, tail, body, motor))
         found = _Seen(
@@ -318,8 +326,9 @@ def _of_trials(values: Samples, *relative: Samples) -> _Trials:
     if known.size == 0:
         return _Trials(values, float("nan"), 0, 0.0, 0.0)
     mean = float(known.mean())
-    variances = sum(np.square(part[np.isfinite(values)]) for part in relative)
-    stated = np.extract(np.isfinite(variances), variances)
+    parts = np.square(np.reshape(relative, (-1, values.size))[:, np.isfinite(values)])
+    is_stated = np.isfinite(parts)  # a part that states none adds nothing
+    stated = parts.sum(axis=0, where=is_stated)[is_stated.any(axis=0)]
     error = float(np.sqrt(stated.mean())) if stated.size else float("nan")
     return _Trials(values, mean, known.size, float(((known - mean) ** 2).sum()), known.size - 1.0, error)
 
