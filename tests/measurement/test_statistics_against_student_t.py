@@ -49,7 +49,19 @@ def test_two_trials_hold_the_truth_whether_they_agree_or_not(
     assert held[0] < inside < held[1]
 
 
-def test_an_unknown_error_of_a_trial_widens_nothing() -> None:
+def test_an_unknown_error_of_a_trial_is_that_of_the_others() -> None:
+    """So that a trial without one narrows the mean no more than one that states it, and never below a single trial."""
+    both, one, alone = (
+        mean_with_interval([1.0, 1.0001, last], within=within)
+        for last, within in ((math.nan, (0.5, 0.5, 0.5)), (math.nan, (0.5, math.nan, 0.1)), (1.0, (0.3, 0.4, math.nan)))
+    )
+    assert both.half_width == pytest.approx(0.5 / math.sqrt(2.0))
+    assert one == both
+    assert alone.half_width == pytest.approx(0.5 / math.sqrt(2.0) / math.sqrt(3.0))
+    assert mean_with_interval([1.0, math.nan], within=(0.5, 0.1)) == (1.0, 0.5, 1)
+
+
+def test_an_error_below_the_scatter_of_trials_widens_nothing() -> None:
     without = mean_with_interval([1.0, 3.0])
     assert mean_with_interval([1.0, 3.0], within=(math.nan, 0.1)) == without
     assert mean_with_interval([1.0, 1.0, math.nan], within=(3.0, 4.0, 9.0)).half_width == pytest.approx(2.5)

@@ -22,7 +22,7 @@ class Mean(NamedTuple):
     """Mean of a few trials with its confidence interval."""
 
     value: float  #: Arithmetic mean; NaN without trials.
-    half_width: float  #: Half width of the interval; NaN with fewer than two trials.
+    half_width: float  #: Half width of the interval; NaN with fewer than two trials and no error of their own.
     trials: int  #: Number of trials.
 
 
@@ -50,20 +50,23 @@ def mean_with_interval(values: Sequence[float], level: float = 0.95, within: Seq
         values: a value of each trial, (n,); NaN where it was not measured.
         level: confidence level.
         within: half width of each trial's own interval at that level, (n,), by errors that are independent between
-            trials; NaN where unknown.
+            trials; NaN where unknown: it then is the root mean square of the others', for all were measured alike, and
+            a trial without an error would narrow the mean.
     """
     measured = np.asarray(values, dtype=float)
     known = ~np.isnan(measured)
-    own = float(np.sqrt(np.nansum(np.square(np.asarray(within, dtype=float)[known])))) if len(within) else 0.0
+    own = np.asarray(within, dtype=float)[known] if len(within) else np.empty(0)
+    own = own[~np.isnan(own)]
+    error = float(np.sqrt(np.mean(own**2))) if own.size else math.nan
     measured = measured[known]
     count = measured.size
     if count == 0:
         return Mean(float("nan"), float("nan"), 0)
     if count == 1:
-        return Mean(float(measured[0]), float("nan"), 1)
+        return Mean(float(measured[0]), error, 1)
     spread = float(measured.std(ddof=1)) / np.sqrt(count)
     reach = student_t_quantile(0.5 + 0.5 * level, count - 1) * spread
-    return Mean(float(measured.mean()), max(reach, own / count), count)
+    return Mean(float(measured.mean()), float(np.fmax(reach, error / np.sqrt(count))), count)
 
 
 PIXEL_ERROR = 0.03  #: Least expected amplitude of periodic errors of the position, by angles or the pixel grid, pixels.
