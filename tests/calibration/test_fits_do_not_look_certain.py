@@ -200,6 +200,17 @@ def test_rows_that_state_other_intervals_are_no_copies() -> None:
     assert [note.code for note in notes] == ["copy-of-a-trial"]
 
 
+def test_a_row_that_leaves_its_intervals_out_is_a_copy() -> None:
+    """Of the row that states them; two that state an interval each of another rate are trials of their own."""
+    row = ObservationRow(2, WIDE, 0.04, 0.025, 2.5e-3, 1e-3, 5.0, -0.5, 5.5, 1, (np.nan,) * 4)
+    other = replace(row, row=3, intervals=(np.nan, 0.1, np.nan, np.nan))
+    most = replace(row, row=4, intervals=(1e-4, 0.1, 0.1, 0.1))
+    kept, notes = without_copies([row, other, most])
+    assert [item.row for item in kept] == [4]
+    assert "rows 2, 3: equal to row 4" in str(notes[0])
+    assert len(without_copies([replace(row, intervals=(1e-4, *row.intervals[1:])), other])[0]) == 2
+
+
 def test_a_row_whose_third_rate_follows_from_the_others_is_a_copy_of_one_that_states_it(tmp_path: Path) -> None:
     """Whichever is left out; rows that state motor rates of their own are trials of their own."""
     file = tmp_path / "observations.csv"

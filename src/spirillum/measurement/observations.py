@@ -216,22 +216,25 @@ def check_driven(path: str | Path, observations: Sequence[ObservationRow], robot
 def without_copies(observations: Iterable[ObservationRow]) -> tuple[list[ObservationRow], tuple[Note, ...]]:
     """The rows without those that repeat another one of their tail in every number, and a note on each such row.
 
-    Two of the three rates give the third: a row that leaves one out repeats a row that states it.
+    Two of the three rates give the third: a row that leaves one out, or an interval, repeats a row that states it.
     """
     items = list(observations)
-    alike: dict[tuple[object, ...], list[ObservationRow]] = {}
+    alike: dict[tuple[object, ...], list[tuple[int, list[str]]]] = {}
     for item in items:
         tail = item.motor_rate + item.body_rate if math.isnan(item.tail_rate) else item.tail_rate
         body = item.tail_rate - item.motor_rate if math.isnan(item.body_rate) else item.body_rate
-        numbers = (item.forward_velocity, tail, body, *item.intervals[:3])
-        alike.setdefault((item.tail, *(f"{number + 0.0:{_DIGITS}}" for number in numbers)), []).append(item)
+        optional = (math.nan if item.motor_derived else item.motor_rate, *item.intervals[:3])
+        key, own = ([f"{n + 0.0:{_DIGITS}}" for n in of] for of in ((item.forward_velocity, tail, body), optional))
+        alike.setdefault((item.tail, *key), []).append((item.row, own))
     copies: dict[int, list[int]] = {}
     for rows in alike.values():
-        first: dict[str, int] = {}
-        for item in sorted(rows, key=lambda row: row.motor_derived):
-            motor = next(iter(first), "") if item.motor_derived else f"{item.motor_rate:{_DIGITS}}"
-            if first.setdefault(motor, item.row) != item.row:
-                copies.setdefault(first[motor], []).append(item.row)
+        kept: dict[tuple[str, ...], int] = {}
+        for row, own in sorted(rows, key=lambda one: one[1].count("nan")):
+            first = next((at for at in kept if all(b in (a, "nan") for a, b in zip(at, own, strict=True))), None)
+            if first is None:
+                kept[tuple(own)] = row
+            else:
+                copies.setdefault(kept[first], []).append(row)
     notes = (Note.named("copied-trials", first=row, rows=rows_in_words(sorted(of))) for row, of in copies.items())
     left_out = {row for of in copies.values() for row in of}
     return [item for item in items if item.row not in left_out], tuple(notes)
