@@ -30,6 +30,17 @@ def test_trials_become_means_in_si(tmp_path: Path) -> None:
     assert (found.motor_rate.value, found.motor_rate.trials) == (pytest.approx(1.3 * 2 * np.pi), 1)
 
 
+def test_trials_numbered_by_timestamps_are_told_apart(tmp_path: Path) -> None:
+    """As are whole numbers beyond those of floating point, of any number of digits."""
+    named = ("20261129224300121", "20261129224300122", f"{5000 * '1'}2", f"{5000 * '1'}3", "inf", "1e400")
+    rows = [f"a,40,25,2.5,{trial},1.{place},1.2,-0.1" for place, trial in enumerate(named)]
+    found = [item.trial for item in read_observations(written(tmp_path, HEADER, *rows))]
+    assert found == [*named[:5], f"1{400 * '0'}"]
+    for again, words in (("2.0261129224300121e16", "rows 2 and 8 are both"), ("20261129224300121.5", "row 8, column")):
+        with pytest.raises(InputError, match=words):
+            read_observations(written(tmp_path, HEADER, *rows, f"a,40,25,2.5,{again},1,1.2,-0.1"))
+
+
 def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
     path = written(
         tmp_path,

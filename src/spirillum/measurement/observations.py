@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from spirillum.measurement.rate_checks import (
 from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
+from spirillum.scalars import plain_minus
 from spirillum.units import Hz
 
 _MM = 1e-3
@@ -134,10 +136,13 @@ def _observation(row: TableRow) -> ObservationRow:
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
-    number = number_in(row.text("trial"))
-    if not math.isnan(number) and not number.is_integer():
-        raise row.error("trial", row.text("trial"), "a whole number, or a name")
-    trial = row.text("trial") if math.isnan(number) else f"{number:.0f}"  # 1, 01 and 1.0 are one trial
+    trial = row.text("trial")
+    if not math.isnan(number_in(trial)):
+        number = Decimal(plain_minus(trial))  # exact, for numbers such as timestamps
+        whole = number.to_integral_value()
+        if number != whole:
+            raise row.error("trial", trial, "a whole number, or a name")
+        trial = f"{whole:f}"  # 1, 01 and 1.0 are one trial
     a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     trials = _trials(row)
     if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
