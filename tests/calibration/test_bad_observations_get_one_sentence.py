@@ -42,6 +42,18 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER, *(row.rsplit(",", 1)[0] + "," for row in GOOD)], "free = 'body_rotation': nothing observed"),
         ([HEADER, *GOOD, "40,10,2.5,0.5,1.0,1.2,-0.1"], "row 5, column trial: '0.5'; allowed: a whole number"),
         (
+            [HEADER, *GOOD, "40,10,2.5,1,1e6,1.2,-0.1"],
+            "observations.csv, row 5, column forward_velocity_mm_s: Reynolds number (body diameter) = ",
+        ),
+        (
+            [HEADER, *GOOD, "40,25,2.5,2,1.0,1e6,-0.1"],
+            "observations.csv, row 5, column tail_rate_Hz: Reynolds number (tail amplitude) = ",
+        ),
+        (
+            [f"{HEADER},motor_rate_Hz", *(f"{row}," for row in GOOD), "40,10,2.5,1,1.0,,-0.1,1e6"],
+            "observations.csv, row 5, column motor_rate_Hz: Reynolds number (tail amplitude) = ",
+        ),
+        (
             [HEADER.rsplit(",", 2)[0], *(row.rsplit(",", 2)[0] for row in GOOD)],
             "row 2, column tail_rate_Hz: empty, as in all rows with a speed; allowed: tail_rate_Hz or motor_rate_Hz",
         ),

@@ -98,7 +98,7 @@ class Experiment:
     robots: tuple[Robot, ...]  #: One for each tail in each channel.
     channels: tuple[float, ...]  #: Channel diameters, m, ascending.
     channel: np.ndarray  #: Index of each robot's channel in `channels`.
-    rows: tuple[tuple[int, ...], ...]  #: Rows of the file that belong to each robot.
+    observed: tuple[tuple[ObservationRow, ...], ...]  #: Rows of the file that belong to each robot.
     advance: Ratio  #: U/omega, m/rad; where the tail's rate was not observed U/omega_m.
     by_motor: np.ndarray  #: Whether the advance is over the motor's rate.
     turning: Ratio  #: Omega/omega.
@@ -116,6 +116,11 @@ class Experiment:
     def size(self) -> int:
         """Number of robots."""
         return len(self.robots)
+
+    @property
+    def rows(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the rows of each robot."""
+        return tuple(tuple(item.row for item in group) for group in self.observed)
 
     def labels(self) -> list[str]:
         """Each robot in a few words."""
@@ -182,7 +187,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         ),
         channels=channels,
         channel=np.array([channels.index(group[0].tail[0]) for group in items]),
-        rows=tuple(tuple(item.row for item in group) for group in items),
+        observed=tuple(map(tuple, items)),
         advance=_ratio([found.advance for found in ratios]),
         by_motor=np.array([found.by_motor for found in ratios]),
         turning=_ratio([found.turning for found in ratios]),

@@ -15,9 +15,17 @@ from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.parameters import Estimate, Uniform
 from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.display import percent
+from spirillum.errors import InputError
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
+from spirillum.robot.limits import (
+    BEYOND_STOKES,
+    body_reynolds,
+    reynolds_limits,
+    reynolds_warnings,
+    stokes_flow_problem,
+    tail_reynolds,
+)
 from spirillum.robust import mad_scale
 
 RATES_IN_RADIANS = Note.named("rates-in-radians")  #: Where most robots need more torque than their motors give.
@@ -193,13 +201,20 @@ def synthetic_warning(source: str) -> Note:
 
 
 def inertia_warnings(experiment: Experiment) -> list[Note]:
-    """Return warnings of observations at Reynolds numbers at which Stokes flow is not accurate."""
-    batch = RobotBatch.of(experiment.robots)
-    rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
-    limits = reynolds_limits(
-        batch, body_reynolds(batch, experiment.advance.mean * rate), tail_reynolds(batch, experiment.tail_rate)
-    )
-    return list(check_stokes_flow(batch, limits).values())
+    """Return warnings of observations where Stokes flow is not accurate; refuse those where inertia dominates."""
+    seen = [(place, item) for place, group in enumerate(experiment.observed) for item in group]
+    speed, tail, body, motor = np.array(
+        [(item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate) for _, item in seen]
+    ).T
+    batch = RobotBatch.of(experiment.robots).taken([place for place, _ in seen])
+    rate = np.where(np.isnan(tail), motor + body, tail)
+    limits = reynolds_limits(batch, body_reynolds(batch, speed), tail_reynolds(batch, rate))
+    for limit, column in zip(limits[1:], ("forward_velocity_mm_s", "tail_rate_Hz"), strict=True):
+        if problem := stokes_flow_problem(batch, [limit]):
+            item = seen[int(np.argmax(limit.value > BEYOND_STOKES))][1]
+            named = "motor_rate_Hz" if limit is limits[2] and np.isnan(item.tail_rate) else column
+            raise InputError(f"{experiment.source}, row {item.row}, column {named}: {problem}")
+    return list(reynolds_warnings(limits).values())
 
 
 def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note]:
