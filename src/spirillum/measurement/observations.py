@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -224,22 +225,21 @@ def without_copies(observations: Iterable[ObservationRow]) -> tuple[list[Observa
     Two of the three rates give the third: a row that leaves one out, or an interval, repeats a row that states it.
     """
     items = list(observations)
-    alike: dict[tuple[object, ...], list[tuple[int, list[str]]]] = {}
+    alike: dict[tuple[object, ...], list[tuple[int, tuple[str, ...]]]] = {}
     for item in items:
         tail = item.motor_rate + item.body_rate if math.isnan(item.tail_rate) else item.tail_rate
         body = item.tail_rate - item.motor_rate if math.isnan(item.body_rate) else item.body_rate
         optional = (math.nan if item.motor_derived else item.motor_rate, *item.intervals[:3])
-        key, own = ([f"{n + 0.0:{_DIGITS}}" for n in of] for of in ((item.forward_velocity, tail, body), optional))
-        alike.setdefault((item.tail, *key), []).append((item.row, own))
+        key, own = (tuple(f"{n + 0.0:{_DIGITS}}" for n in of) for of in ((item.forward_velocity, tail, body), optional))
+        alike.setdefault((item.tail, key), []).append((item.row, own))
     copies: dict[int, list[int]] = {}
     for rows in alike.values():
-        kept: dict[tuple[str, ...], int] = {}
+        first: dict[tuple[str, ...], int] = {}
         for row, own in sorted(rows, key=lambda one: one[1].count("nan")):
-            first = next((at for at in kept if all(b in (a, "nan") for a, b in zip(at, own, strict=True))), None)
-            if first is None:
-                kept[tuple(own)] = row
-            else:
-                copies.setdefault(kept[first], []).append(row)
+            if own in first:
+                copies.setdefault(first[own], []).append(row)
+            else:  # and whatever leaves some of its numbers out
+                first |= {less: row for less in product(*((n, "nan") for n in own)) if less not in first}
     notes = (Note.named("copied-trials", first=row, rows=rows_in_words(sorted(of))) for row, of in copies.items())
     left_out = {row for of in copies.values() for row in of}
     return [item for item in items if item.row not in left_out], tuple(notes)
