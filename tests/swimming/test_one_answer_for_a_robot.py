@@ -3,11 +3,13 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import spirillum as sp
 from spirillum.dynamics.plant import Plant
 from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.published import paper_study
 from spirillum.studies import run
@@ -212,3 +214,12 @@ def test_every_answer_gives_the_choice_and_its_reason_in_the_same_words() -> Non
     }
     said = {name: (answer["model"], answer["model_reason"]) for name, answer in answers.items()}
     assert said == dict.fromkeys(said, ("tube", "the robot is in a channel, whose walls this model computes"))
+
+
+def test_a_batch_counts_the_robots_nearer_to_the_glass_than_their_table_was_checked() -> None:
+    near = sp.RobotBatch.of(sp.load(WIDE), sp.Placement.of({"gap": "0.05 mm", "pitch": "0 deg"}))
+    batch = near.with_values({"body.mass": [1.0, 2.0, 3.0], "fluid.viscosity": [3.5, np.nan, 4.0]})
+    model = quickest(find_swimmer_model("tube"), near)
+    found = sp.swim(batch, model)
+    assert found.valid.tolist() == [True, False, True]
+    assert any(note.startswith("2 of 3 robots (tube), the first: gap = 0.05 mm; accurate") for note in found.warnings)

@@ -87,6 +87,44 @@ def test_robots_of_a_batch_are_refused_one_by_one_and_keep_their_reynolds_number
     np.testing.assert_allclose(found.tail_reynolds_number, 985 * 6.0 * 2.5e-3**2 / np.array([1e-3, 1.0]), rtol=1e-12)
 
 
+CAUTIONS = ("inertia", "outside-validity", "calibration-outside")
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "model"),
+    [
+        ("fluid.viscosity", (3.0, 0.3), "rft"),
+        ("tail.wire_diameter", (0.001, 0.004), "rft"),
+        ("tail.length", (0.06, 0.02), "sbt"),
+        ("channel.diameter", (0.04, np.inf), "sbt"),
+        ("channel.diameter", (0.04, 0.2), "sbt"),
+        ("body.diameter", (0.018, 0.014), "rft"),
+    ],
+)
+def test_a_batch_has_the_cautions_of_its_robots_and_counts_them(
+    field: str, values: tuple[float, float], model: str
+) -> None:
+    usual, value = values
+    wall = {"channel": "none"} if value == np.inf else {field: f"{value} {'Pa s' if 'viscosity' in field else 'm'}"}
+    predicted = sp.predict(sp.load("biorob2012-wide", **wall), model=model).warnings
+    cautions = [note for note in predicted if note.code in CAUTIONS]
+    assert cautions
+    one = sp.RobotBatch.of(sp.load("biorob2012-wide"))
+    alone = sp.swim(one.with_values({field: value}), model).warnings
+    assert [note for note in alone if note.code in CAUTIONS] == cautions
+    column = np.full(100_000, usual)
+    column[[7, 70_000]] = value
+    together = sp.swim(one.with_values({field: column}), model).warnings
+    several = [note for note in together if note.code in CAUTIONS]
+    assert several == [note.prefixed(f"2 of 100000 robots ({model}), the first: ") for note in cautions]
+    assert [note.fields for note in several] == [note.fields for note in cautions]
+
+
+def test_cautions_are_of_robots_that_have_an_answer() -> None:
+    batch = sp.RobotBatch.of(sp.load("biorob2012-wide")).with_values({"tail.wire_diameter": [0.004, np.nan, 0.001]})
+    assert any(note.startswith("1 of 3 robots (rft), the first: eps") for note in sp.swim(batch, "rft").warnings)
+
+
 def test_a_study_names_the_robots_that_it_refuses() -> None:
     vary = {"fluid.viscosity": ["1 mPa s", "3 Pa s"]}
     found = sp.study({"models": ["sbt"], "friction": ["rotor"], "robots": ["biorob2012-wide"], "vary": vary})

@@ -44,10 +44,10 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import sampled_kinematics
 from spirillum.swimming.motions import HELD, RELEASED
 from spirillum.swimming.preparation import fitted_with, has_table
-from spirillum.swimming.scenario import calibration_warnings
 
 _WHAT = "a file of candidates (CSV with channel_diameter_mm, wavelength_mm, amplitude_mm)"
 _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")

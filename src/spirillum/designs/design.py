@@ -25,9 +25,10 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.balance import find_friction_model
+from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.motions import LEVEL, STEADY, Swimming
 from spirillum.swimming.preparation import AUTO, WALLED
-from spirillum.swimming.scenario import calibration_warnings, drive_warnings
+from spirillum.swimming.scenario import drive_warnings
 from spirillum.units import KINDS, parse_option, show
 
 _MORE_DRAWS = 4  # draws of what is stated over those of the search

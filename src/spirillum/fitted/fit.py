@@ -152,7 +152,7 @@ class Fit:
 
     def geometry_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[Note]:
         """Whether fitted values act in another channel, or of a posterior on another body, than they were fitted to."""
-        # That of a model's own drag factors is `spirillum.swimming.scenario.calibration_warnings`.
+        # That of a model's own drag factors is `spirillum.swimming.cautions.calibration_warnings`.
         acting = (
             robot
             for robot in robots

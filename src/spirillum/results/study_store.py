@@ -18,7 +18,7 @@ from spirillum.errors import InputError
 from spirillum.files import is_whole, opened_store, read_json, results_folder, store_files, store_target, write_pieces
 from spirillum.notes import note_attributes, notes_in
 from spirillum.optional_dependencies import import_optional
-from spirillum.studies.dataset import Caution, described, summed
+from spirillum.studies.dataset import described
 from spirillum.studies.regions import (
     CostEstimate,
     Pace,
@@ -33,6 +33,7 @@ from spirillum.studies.regions import (
 )
 from spirillum.studies.run import make_tables, warnings_of, warnings_of_calibrations
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
+from spirillum.swimming.cautions import Caution, summed
 from spirillum.worker_pool import WorkerPool, map_tasks
 
 if TYPE_CHECKING:

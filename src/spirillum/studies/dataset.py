@@ -17,7 +17,7 @@ from spirillum.files import loaded_netcdf, open_netcdf
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
-from spirillum.robot.limits import broken, caution_code, reynolds_limits, stokes_flow_problem
+from spirillum.robot.limits import broken, reynolds_limits, stokes_flow_problem
 from spirillum.studies.columns import BandTask, HeldTask, TrialTask, column_variables, with_band
 from spirillum.studies.released_robots import (
     AT_RUNS,
@@ -36,6 +36,7 @@ from spirillum.studies.released_robots import (
 from spirillum.studies.spec import LaidDown
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import REASONS, ModelTask, Part, flag_attributes, gathered
+from spirillum.swimming.cautions import NO_ANSWER, Caution, accuracy_cautions
 from spirillum.swimming.motions import STEADY, Swimming
 from spirillum.version import versions
 
@@ -308,16 +309,6 @@ def is_dataset(path: Path) -> bool:
     return False
 
 
-class Caution(NamedTuple):
-    """A requirement that robots of a task break: one of accuracy, or one without which they have no answer."""
-
-    model: str
-    flag: str
-    robots: int
-    sentence: str  #: The first of them in words.
-    refused: bool = False  #: Whether they have no answer for it.
-
-
 def _refusals(task: ModelTask, part: Part) -> list[Caution]:
     """Why robots of a task have no answer, one for each requirement; each robot counts for the first that it breaks."""
     left = np.any(part["outside"] != 0, axis=-1)
@@ -326,14 +317,14 @@ def _refusals(task: ModelTask, part: Part) -> list[Caution]:
         of_this = left & ~np.broadcast_to(limit.holds, left.shape)
         if of_this.any():
             sentence = limit.sentence(int(np.argmax(of_this)))
-            found.append(Caution(task.model, limit.flag, int(np.count_nonzero(of_this)), sentence, refused=True))
+            found.append(Caution(task.model, limit.flag, int(np.count_nonzero(of_this)), NO_ANSWER, sentence))
         left &= ~of_this
     found += _beyond_stokes(task, part, left)
     left &= ~np.any(part["outside"] == REASONS.index("beyond-stokes"), axis=-1)
     if left.any():
         lacking = np.count_nonzero(part["outside"][int(np.argmax(left))])
         sentence = f"no steady motion under {lacking} of {part['outside'].shape[-1]} friction models"
-        found.append(Caution(task.model, "other", int(np.count_nonzero(left)), sentence, refused=True))
+        found.append(Caution(task.model, "other", int(np.count_nonzero(left)), NO_ANSWER, sentence))
     return found
 
 
@@ -347,39 +338,11 @@ def _beyond_stokes(task: ModelTask, part: Part, left: Flags) -> list[Caution]:
     numbers = [part[name][rows, reading] for name in ("reynolds_number", "tail_reynolds_number")]
     batch = task.batch.taken(rows)
     sentence = stokes_flow_problem(batch, reynolds_limits(batch, *numbers))
-    return [Caution(task.model, "beyond-stokes", len(rows), sentence, refused=True)]
+    return [Caution(task.model, "beyond-stokes", len(rows), NO_ANSWER, sentence)]
 
 
 def cautions(task: ModelTask, part: Part) -> list[Caution]:
     """What to be careful about in a task's answer, and why robots have none, one for each kind."""
-    size = task.batch.size
     columns: dict[str, Any] = {item.name: part[item.name][:, 0] for item in STEADY}
     first = Swimming(**columns, valid=part["outside"][:, 0] == 0)
-    found = _refusals(task, part)
-    for limit in broken(
-        [
-            *find_swimmer_model(task.model).cautions(task.batch),
-            *reynolds_limits(task.batch, first.reynolds_number, first.tail_reynolds_number),
-        ]
-    ):
-        holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
-        holds |= part["outside"][:, 0] == REASONS.index("beyond-stokes")
-        count = int(np.count_nonzero(~holds))
-        if count:
-            found.append(Caution(task.model, limit.flag, count, limit.caution(int(np.argmin(holds)))))
-    return found
-
-
-def summed(found: Iterable[Caution], robots: int) -> list[Note]:
-    """A note for each kind of caution, over all tasks of a study."""
-    groups: dict[tuple[str, str, bool], list[Caution]] = {}
-    for caution in found:
-        groups.setdefault((caution.model, caution.flag, caution.refused), []).append(caution)
-    return [
-        Note(
-            "without-answer" if refused else caution_code(flag),
-            f"{sum(caution.robots for caution in group)} of {robots} robots "
-            f"{'have no answer ' if refused else ''}({model}), the first: {group[0].sentence}",
-        )
-        for (model, flag, refused), group in groups.items()
-    ]
+    return [*_refusals(task, part), *accuracy_cautions(find_swimmer_model(task.model), task.batch, first)]

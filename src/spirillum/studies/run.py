@@ -34,7 +34,7 @@ from spirillum.studies.columns import (
     missing_pose_notes,
     trial_notes,
 )
-from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, labelled_answers, summed
+from spirillum.studies.dataset import BesideModels, cautions, checksum_of, described, labelled_answers
 from spirillum.studies.released_robots import (
     ReleaseTask,
     SettledTask,
@@ -45,8 +45,9 @@ from spirillum.studies.released_robots import (
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
+from spirillum.swimming.cautions import calibration_warnings, summed
 from spirillum.swimming.preparation import check_may_be_made, has_table, missing_tables
-from spirillum.swimming.scenario import CONSTANT_TORQUE, calibration_warnings
+from spirillum.swimming.scenario import CONSTANT_TORQUE
 from spirillum.version import package_version
 from spirillum.worker_pool import ESTIMATE, WorkerPool, map_tasks
 

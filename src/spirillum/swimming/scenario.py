@@ -11,13 +11,14 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.fitted.fit import Fit
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
+from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken, in_stokes_flow, reynolds_limits, stokes_flow_problem
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionModel
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.cautions import accuracy_cautions, calibration_warnings
 from spirillum.swimming.motions import Motion, Swimming
 from spirillum.swimming.steady import calibrated_balance, speed_error, swim, swim_on_floor
 from spirillum.units import show
@@ -36,32 +37,6 @@ def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Sw
     least = (1.837 * pulled * np.sqrt(a * radius / (radius - a)) / bound) ** (2.0 / 3.0)
     gap = np.atleast_1d(gap_of(batch.placement, 2.0 * a, radius))
     return [Limit.named("cavitation", gap, least)]
-
-
-def calibration_warnings(robot: Robot, model: str) -> list[Note]:
-    """Return notes on a robot's calibration for a model; a model that computes the walls takes none."""
-    if find_swimmer_model(model).placed:
-        return []
-    entry = robot.calibration.get(model)
-    if entry is None:
-        return [] if robot.channel is None else [Note.named("not-calibrated", model=model)]  # no walls to represent
-    fitted = entry.fitted_to
-    channel = robot.channel.diameter if robot.channel else None
-    pairs = (
-        ("channel.diameter", channel, fitted.channel_diameter),
-        ("body.diameter", robot.body.diameter, fitted.body_diameter),
-        ("body.length", robot.body.length, fitted.body_length),
-    )
-    differing = [
-        f"{name} = {'none' if value is None else show(value, 'mm')} (fitted to {show(fit, 'mm')})"
-        for name, value, fit in pairs
-        if value is None or not np.isclose(value, fit, rtol=1e-6)
-    ]
-    if not differing:
-        return []
-    more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
-    fields = [words.partition(" = ")[0] for words in differing]
-    return [Note.named("calibrated-elsewhere", model=model, differs=differing[0], more=more, fields=fields)]
 
 
 CONSTANT_TORQUE = Note.named("constant-torque")  #: What a drive of given torque takes for granted.
@@ -155,9 +130,9 @@ class Scenario:
         if checks:
             speeds = [one.forward_velocity for one in (result, *checks)]
             error = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
-        return result, in_stokes_flow(error, *limits), self._warnings(result, limits)
+        return result, in_stokes_flow(error, *limits), self._warnings(result)
 
-    def _warnings(self, result: Swimming, limits: Sequence[Limit]) -> list[Note]:
+    def _warnings(self, result: Swimming) -> list[Note]:
         """What to be careful about: calibration, accuracy, drive, what a free motion leaves out."""
         robot, model, batch, rate = self.robot, self.model, self.batch, self.tail_rate
         known = robot  # of the user's file: without the B_eff of a calibration
@@ -168,7 +143,7 @@ class Scenario:
         placed |= robot.body.mass is not None and robot.tail.density is not None  # its weight keeps it on the floor
         return [
             *(calibration_warnings(robot, model.name) if self.calibrated else ()),
-            *(limit.caution() for limit in broken([*model.cautions(batch), *limits])),
+            *(found.note for found in accuracy_cautions(model, batch, result)),
             *(limit.caution() for limit in broken(film_limits(robot, model, batch, result))),
             *drive_warnings(known, model, self.friction, result, rate),
             *(self._left_out() if self.motion == "free" else ()),

@@ -46,6 +46,7 @@ from spirillum.swimming.balance import (
     run_time,
     with_body_factors,
 )
+from spirillum.swimming.cautions import accuracy_cautions, calibration_cautions, summed
 from spirillum.swimming.motions import STEADY, Motion, Screw, Swimming, check_full, motion_of
 
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
@@ -126,11 +127,14 @@ def swim(
     lateral = motion_of(motion)
     if lateral == "free":
         _check_free(batch, chosen)
-    parts = [
-        _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
-        for cut, block in batch.blocks(_BLOCK)
-    ]
-    return one_after_another(parts, _wall_notes(batch, chosen, calibrated=calibrated))
+    parts, found = [], []
+    for cut, block in batch.blocks(_BLOCK):
+        part = _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
+        found += accuracy_cautions(chosen, block, part)
+        found += calibration_cautions(chosen, block, part.valid) if calibrated else []
+        parts.append(part)
+    notes = summed(found, batch.size) if batch.size > 1 else [caution.note for caution in found]
+    return one_after_another(parts, (*_wall_notes(batch, chosen, calibrated=calibrated), *notes))
 
 
 def _wall_notes(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool) -> tuple[Note, ...]:

@@ -32,6 +32,7 @@ from spirillum.kernels.tube_table import PHASES
 from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
+from spirillum.robot.tube_pose import TubePose
 
 _SHIPPED = Path(__file__).parent / "tables"
 _OF_PAPERS = tuple(sorted(Path(__file__).parents[2].glob("papers/*/tables")))
@@ -188,15 +189,20 @@ class TabledTube(Tube):
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """Limits of the poses for which the table's errors were estimated."""
-        gaps, least, yaws, most = np.full((4, batch.size), np.nan)
-        for index in range(batch.size):
-            table, pose = self.table_of(batch, index), pose_of(batch, index)
-            gaps[index], least[index] = pose.clearance(table.geometry.body), least_checked_gap(table.packed)
-            yaws[index], most[index] = abs(pose.yaw), largest_yaw(table.packed, pose.offset, pose.pitch)
+        found = np.full((4, batch.size), np.nan)
+        known: dict[tuple[RobotGeometry, TubePose], tuple[float, ...]] = {}
+        for index in within(batch, self.domain(batch)):
+            seat = geometry, pose = seated(batch, index)
+            if seat not in known:
+                packed = self._table(batch, index, geometry, pose.radius).packed
+                gaps = pose.clearance(geometry.body), least_checked_gap(packed)
+                known[seat] = (*gaps, abs(pose.yaw), largest_yaw(packed, pose.offset, pose.pitch))
+            found[:, index] = known[seat]
+        gap, least, yaw, most = found
         return [
             *super().cautions(batch),
-            Limit.named("checked-gap", gaps, least, below=BELOW),
-            Limit.named("checked-yaw", yaws, most),
+            Limit.named("checked-gap", gap, least, below=BELOW),
+            Limit.named("checked-yaw", yaw, most),
         ]
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
