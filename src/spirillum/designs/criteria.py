@@ -16,7 +16,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.quantities import Quantity
 from spirillum.robot.arguments import Options
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.fields import LengthOrZero, field_values
+from spirillum.robot.fields import LengthOrZero, field_values, kind_of
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
 from spirillum.robot.tail_form import coil_curvature
@@ -107,17 +107,18 @@ def condition_of(text: str, option: str = "subject_to") -> Condition:
             "'motor_current <= 0.4 A'"
         )
     quantity = quantity_of(found[1], option)
+    kind = None if quantity.unit == "1" else _kind(quantity.unit)
     return Condition(
-        quantity, cast("Literal['<=', '>=']", found[2]), _value(f"{option} {quantity.name}", found[3], quantity.unit)
+        quantity, cast("Literal['<=', '>=']", found[2]), _value(f"{option} {quantity.name}", found[3], kind)
     )
 
 
-def range_of(name: str, given: str | Sequence[object], unit: str) -> tuple[float, float]:
-    """The two ends of a range, SI."""
+def range_of(name: str, given: str | Sequence[object], kind: Kind | None) -> tuple[float, float]:
+    """The two ends of a range, SI; None: of numbers without unit."""
     ends: object = given.split(":") if isinstance(given, str) else given
     if isinstance(ends, bytes) or not isinstance(ends, Sequence) or len(ends) != 2:
         raise InputError(f"{name} = {str(given)[:60]!r}; allowed: LOW:HIGH, each with its unit")
-    low, high = (_value(name, end, unit) for end in ends)
+    low, high = (_value(name, end, kind) for end in ends)
     return low, high
 
 
@@ -126,8 +127,8 @@ def _as_typed(given: str | Sequence[object], unit: str) -> str:
     return given[:60] if isinstance(given, str) else ":".join(as_given(end, unit) for end in given)
 
 
-def _value(name: str, given: object, unit: str) -> float:
-    if unit == "1":
+def _value(name: str, given: object, kind: Kind | None) -> float:
+    if kind is None:
         try:
             number = float(str(given))
         except ValueError:
@@ -135,7 +136,7 @@ def _value(name: str, given: object, unit: str) -> float:
         if isinstance(given, bool) or not np.isfinite(number):
             raise InputError(f"{name} = {str(given)[:60]!r}; allowed: a finite number without unit")
         return number
-    return parse_option(name, given.strip() if isinstance(given, str) else cast("float", given), _kind(unit))
+    return parse_option(name, given.strip() if isinstance(given, str) else cast("float", given), kind)
 
 
 @lru_cache(maxsize=64)
@@ -271,7 +272,7 @@ def space_of(robot: Robot, vary: Mapping[str, str | Sequence[object]]) -> Space:
 def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: str = "vary") -> Variable:
     """One field with its range."""
     if path == TURNS:
-        low, high = range_of(f"{option} {path}", given, "1")
+        low, high = range_of(f"{option} {path}", given, None)
         if low != round(low) or high != round(high) or not 1 <= low <= high <= _MOST_TURNS:
             raise InputError(f"{option} {path} = {low:g}:{high:g}; allowed: whole numbers from 1 to {_MOST_TURNS}")
         return Variable(path, "1", low, high)
@@ -286,7 +287,7 @@ def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: 
     if (source := robot.source_of(path)) is not None:
         raise InputError(f"{option} {path} follows from {source}; allowed: fields that it leaves open")
     unit = units[path] or "1"
-    low, high = range_of(f"{option} {path}", given, unit)
+    low, high = range_of(f"{option} {path}", given, kind_of(robot, path))
     if not low < high:
         raise InputError(f"{option} {path} = {_as_typed(given, unit)}; allowed: LOW:HIGH with LOW below HIGH")
     try:
