@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.load import load
@@ -174,6 +175,9 @@ def test_rates_have_to_match_the_batch(wide: Any, name: str) -> None:
     batch = wide.with_values({"tail.wavelength": WAVELENGTHS})
     with pytest.raises(InputError, match=rf"{name} has shape \(3,\); allowed: one value, or 4, one for each robot"):
         swim(batch, **{name: np.ones(3)})
+    for one in (2.0, [2.0], 2):
+        assert_equal(sp.swim(wide, "sbt", **{name: one}), 0, swim(wide, "sbt", **{name: np.array([2.0])}))
+    assert sp.swim(batch, "sbt", **{name: [1.0, 2.0, 3.0, 4.0]}).valid.all()
 
 
 @pytest.mark.parametrize(
@@ -190,10 +194,14 @@ def test_what_is_no_robot_is_not_stacked() -> None:
         (["biorob2012-wide"], r"robots\[0\] = 'biorob2012-wide'; allowed: a RobotTables"),
         ([robot, None], r"robots\[1\] = None; allowed: a RobotTables"),
         (None, "robots = None; allowed: a RobotTables or a list"),
+        ([robot, load("ecoli")], "use spirillum.robot.batch.batches for a mixed list"),
         ([], r"robots = \[\]; allowed: one robot, or several"),
     ):
         with pytest.raises(InputError, match=words):
             RobotBatch.of(wrong)
+    for wrong, words in ((None, "robots = None; allowed: a list"), ([1], r"robots\[0\] = 1; allowed: a RobotTables")):
+        with pytest.raises(InputError, match=words):
+            batches(wrong)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="placement = 'low'; allowed: a Placement or None"):
         RobotBatch.of(robot, "low")  # type: ignore[arg-type]
 
@@ -212,6 +220,12 @@ def test_parts_of_a_batch_are_asked_for_by_numbers(wide: Any) -> None:
     with pytest.raises(InputError, match="placement = 'foo'; allowed: a Placement"):
         batch.placed("foo")
     assert batch.taken([3, 0, 3]).wavelength.tolist() == WAVELENGTHS[[3, 0, 3]].tolist()
+    assert (wide.taken([0, 0, 0]).size, wide.taken([0]).size) == (3, 1)
+    assert sp.swim(wide.taken([0, 0, 0]), "sbt").forward_velocity.tolist() == 3 * [
+        swim(wide, "sbt").forward_velocity[0]
+    ]
+    with pytest.raises(InputError, match=r"rows has shape \(0,\); allowed: "):
+        batch.taken(np.array([], dtype=int))
 
 
 def test_unknown_model_and_missing_drive(wide: Any, batch_of: Callable[..., Any]) -> None:

@@ -170,7 +170,7 @@ class RobotBatch:
         if len({_shared(robot) for robot in items}) != 1:
             raise InputError(
                 "robots of one batch have to share body shape, model options, drive and friction model; "
-                "use spirillum.robot.batches for a mixed list"
+                "use spirillum.robot.batch.batches for a mixed list"
             )
         first = items[0]
         hand = np.array([robot.hand for robot in items])
@@ -204,13 +204,13 @@ class RobotBatch:
         """Robots by their numbers, in that order, each as often as it is named."""
         allowed = f"whole numbers from 0 to {self.size - 1}, one after the other"
         chosen = whole_array("rows", rows, allowed)
-        if chosen.ndim != 1:
+        if chosen.ndim != 1 or not chosen.size:
             raise InputError(f"rows has shape {chosen.shape}; allowed: {allowed}")
         outside = (chosen < 0) | (chosen >= self.size)
         if np.any(outside):
             place = int(np.argmax(outside))
             raise InputError(f"rows[{place}] = {chosen[place]}; allowed: {allowed}")
-        return _cut(self, chosen) if self.size > 1 else self
+        return _cut(self, chosen) if self.size > 1 else replace(self, hand=self.hand[chosen])
 
     @validate_arguments
     def placed(self, placement: Placement) -> RobotBatch:
@@ -372,6 +372,7 @@ def _shared(robot: RobotTables) -> tuple[object, ...]:
     )
 
 
+@validate_arguments
 def batches(robots: Sequence[RobotTables], placement: Placement | None = None) -> list[tuple[list[int], RobotBatch]]:
     """Group a mixed list of robots into batches, each with the indices of its robots in the list."""
     groups: dict[tuple[object, ...], list[int]] = {}

@@ -91,8 +91,8 @@ def swim(
     batch: RobotBatch,
     model: str | SwimmerModel = "sbt",
     *,
-    tail_rate: PerRobot | None = None,
-    motor_rate: PerRobot | None = None,
+    tail_rate: PerRobot | Sequence[float] | float | None = None,
+    motor_rate: PerRobot | Sequence[float] | float | None = None,
     friction: str | None = None,
     calibrated: bool = True,
     motion: str = "held",
@@ -102,8 +102,8 @@ def swim(
     Args:
         batch: the robots; a million is one call.
         model: a hydrodynamic model, or its name.
-        tail_rate: prescribed lab rates of the tail, rad/s; without them the robots' drive decides. With a
-            DC-motor the current then follows from (17) and the effective friction from (18).
+        tail_rate: prescribed lab rates of the tail, rad/s, one or one each; without them the robots' drive decides.
+            With a DC-motor the current then follows from (17) and the effective friction from (18).
         motor_rate: prescribed (observed) motor rates omega_m, rad/s, alone or together with `tail_rate`.
         friction: friction model; None: the robots' own.
         calibrated: apply the robots' calibration factors for this model.
@@ -170,7 +170,7 @@ def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
     return total
 
 
-def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
+def _per_robot(rate: PerRobot | Sequence[float] | float | None, batch: RobotBatch, name: str) -> PerRobot:
     """One rate for each robot; NaN where there is none."""
     array = np.atleast_1d(number_array(name, np.nan if rate is None else rate, "numbers in rad/s"))
     if array.ndim != 1 or array.size not in (1, batch.size):
