@@ -8,6 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
+from spirillum.files import results_folder
 from spirillum.results.calibration import check_folder, earlier_results, write_calibration
 
 WIDE = "biorob2012-wide"
@@ -38,15 +39,27 @@ def test_a_file_that_no_calibration_wrote_is_refused_and_stays(found: Any, tmp_p
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [foreign]
 
 
-def test_numbers_are_written_before_the_figures(found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(_found: Any) -> None:
+def test_an_interrupt_while_figures_are_drawn_leaves_the_earlier_calibration(
+    found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted() -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_drawings", interrupted)
+    def files() -> dict[Path, int]:
+        return {path: path.stat().st_ino for path in tmp_path.rglob("*") if path.is_file()}
+
+    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_drawings", small_drawings)
+    write_calibration(found, tmp_path, vector=True)
+    before = files()
+    assert len(before) == 6
+    drawings = {**small_drawings(found), "posterior": interrupted}
+    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_drawings", lambda _found: drawings)
     with pytest.raises(KeyboardInterrupt):
         write_calibration(found, tmp_path)
-    assert {path.name for path in tmp_path.glob("*.*")} == {"calibration.toml", "predictions.csv"}
-    assert sp.predict(WIDE, tail_rate="1 Hz", calibration=tmp_path / "calibration.toml").calibrated
+    assert files() == before
+    with pytest.raises(KeyboardInterrupt), results_folder(tmp_path / "new") as folder:
+        write_calibration(found, folder)
+    assert not (tmp_path / "new").exists()
 
 
 def test_figures_of_an_earlier_run_go_and_changed_ones_stay(

@@ -264,7 +264,7 @@ def test_interrupt_that_a_library_has_caught_leaves_with_130(
     [
         ("study -o out", "spirillum.studies.run.map_tasks", "robots that were finished are kept; the same"),
         ("prepare magnetic-helix", "spirillum.cli.renderer.progress_bar", "finished tables and poses are kept"),
-        ("calibrate o.csv x.toml -o fit", "spirillum.robot.load.load", "nothing of this fit is kept"),
+        ("calibrate o.csv x.toml -o fit", "spirillum.robot.load.load", "an unfinished fit is not kept"),
         ("predict magnetic-helix", "spirillum.dynamics.prediction.predict", "finished files are kept"),
     ],
 )

@@ -1,5 +1,6 @@
 """A file that this program has not written stays as it is, whatever a command is asked to do beside it."""
 
+import contextlib
 import os
 import re
 import tempfile
@@ -15,6 +16,7 @@ from spirillum.files import (
     MARK,
     atomic_folder,
     atomic_write,
+    atomic_write_all,
     file_name,
     guard_inputs,
     output_folder,
@@ -210,12 +212,14 @@ def test_an_interrupted_calibration_is_run_again_and_loses_nothing(
     from spirillum.results import calibration
     from spirillum.view.figures import style
 
+    sp.calibrate(tmp_path / "o.csv", WIDE, **options, figures=False)
+    first = {path: path.stat().st_ino for path in (tmp_path / "c").iterdir()}
     drawings = "spirillum.view.figures.calibration.calibration_drawings"
     monkeypatch.setattr(drawings, lambda _found: dict.fromkeys(("residuals", "profiles"), lambda: None))
     monkeypatch.setattr(style, "save", _stopped_at_the_second(style.save))
     with pytest.raises(KeyboardInterrupt):
         sp.calibrate(tmp_path / "o.csv", WIDE, **options)
-    first = (tmp_path / "c" / "calibration.toml").read_bytes()
+    assert {path: path.stat().st_ino for path in (tmp_path / "c").iterdir()} == first
 
     def full(*_: object) -> str:
         raise OSError(28, "No space left on device")
@@ -224,9 +228,26 @@ def test_an_interrupted_calibration_is_run_again_and_loses_nothing(
         patch.setattr(calibration, "predictions_text", full)
         with pytest.raises(OSError, match="No space"):
             sp.calibrate(tmp_path / "o.csv", WIDE, **options, figures=False)
-    assert (tmp_path / "c" / "calibration.toml").read_bytes() == first
+    assert {path: path.stat().st_ino for path in (tmp_path / "c").iterdir()} == first
     found = sp.calibrate(tmp_path / "o.csv", WIDE, **options, figures=False)
     assert found.files == ("calibration.toml", "predictions.csv")
+
+
+def test_an_interrupt_does_not_part_files_that_belong_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(part: Path, place: Path) -> Path:
+        if place == paths[1]:
+            monkeypatch.undo()
+            raise KeyboardInterrupt
+        return replaced(part, place)
+
+    replaced, paths = Path.replace, [tmp_path / "a", tmp_path / "b"]
+    (tmp_path / "c").touch()
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with contextlib.suppress(KeyboardInterrupt), atomic_write_all(paths, earlier=[tmp_path / "c"]) as parts:
+        for path in paths:
+            parts[path].write_text("new")
+    assert Path.replace is replaced  # it was interrupted
+    assert sorted(tmp_path.iterdir()) == paths
 
 
 def _stopped_at_the_second(drawn: Callable[..., list[Path]]) -> Callable[..., list[Path]]:

@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 from spirillum.errors import InputError
 
 _KEPT = {
-    "calibrate": "nothing of this fit is kept; earlier results stay",
+    "calibrate": "an unfinished fit is not kept; earlier results stay until all new ones are there",
     "design": "nothing of this search is kept",
     "prepare": "finished tables and poses are kept; the same command resumes",
     "study": "robots that were finished are kept; the same command resumes",

@@ -118,39 +118,56 @@ def atomic_write(path: Path, *, replace: Replace = "own", begins: bytes = b"", s
 
 @contextmanager
 def atomic_write_all(
-    paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
+    paths: Collection[Path] | Mapping[Path, bytes],
+    *,
+    replace: Replace = "own",
+    sync: bool = True,
+    earlier: Collection[Path] = (),
 ) -> Iterator[dict[Path, Path]]:
-    """Give temporary paths of files that belong together; all are made before the first is renamed."""
+    """Give temporary paths of files that belong together; all are made before the first is renamed.
+
+    Other files of an `earlier` run are removed with the renames.
+    """
     begins = dict(paths) if isinstance(paths, Mapping) else dict.fromkeys(paths, b"")
     places = {path: check_replaceable(path, replace, start) for path, start in begins.items()}
     with ExitStack() as stack:
         folders: dict[Path, Path] = {}
         temporary: dict[Path, Path] = {}
-        for number, (path, place) in enumerate(places.items()):
+        for path, place in places.items():
             if place.parent not in folders:
                 try:
                     folders[place.parent] = stack.enter_context(private_folder(place.parent))
                 except OSError as error:
                     raise _unwritable(path, error) from error
-            inside = folders[place.parent]
-            if len(places) > 1:
-                inside = inside / str(number)
-                inside.mkdir()
-            temporary[path] = inside / place.name
+            temporary[path] = folders[place.parent] / place.name
         with _named(temporary):
             yield temporary
-            made = {path: made for path, made in temporary.items() if made.exists()}
-            for part in made.values():
+            made = {path: (part, places[path]) for path, part in temporary.items() if part.exists()}
+            for part, _ in made.values():
                 _finish(part, sync=sync)
-        for path, part in made.items():
+        for path in made:
             check_replaceable(path, replace, begins[path])  # it may have come meanwhile
-            try:
-                part.replace(places[path])
-            except OSError as error:
-                raise _unwritable(path, error) from error
+        try:
+            _exchange(made, earlier)
+        except KeyboardInterrupt:  # which does not part the files
+            _exchange(made, earlier)
+            raise
         if sync:
             for folder in folders:
                 synced(folder)
+
+
+def _exchange(made: Mapping[Path, tuple[Path, Path]], earlier: Collection[Path]) -> None:
+    """Rename files that were made, as far as they are not yet, and remove the other ones of an earlier run."""
+    for path, (part, place) in made.items():
+        try:
+            if part.exists():
+                part.replace(place)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+    for path in earlier:
+        if path not in made:
+            path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -294,7 +311,7 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
     folder = checked_path(path, "a folder for the results (-o DIR)")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file, no folder for results; allowed: a folder for the results (-o DIR)")
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    missing = [place for place in (folder / "figures", folder, *folder.parents) if not place.exists()]
     try:
         with locked(output_folder(folder)):
             if (folder / "figures").exists():

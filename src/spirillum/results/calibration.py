@@ -21,7 +21,7 @@ from spirillum.fitted.posterior_file import write_posterior
 from spirillum.formats.templates import rendered
 from spirillum.notes import Note
 from spirillum.progress import Progress, tell
-from spirillum.results.page import draw_together, load_figures
+from spirillum.results.page import Drawings, draw_together, load_figures
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
 from spirillum.swimming.preparation import AUTO
@@ -212,35 +212,35 @@ def write_calibration(
     beside: ProcessPoolExecutor | None = None,
     progress: Progress | None = None,
 ) -> Calibrated:
-    """Write all files of a calibration, the figures last, each whole or not at all; return it with their names."""
-    # The numbers are all made before the first takes the place of an earlier calibration's, and what that one had more
-    # goes afterwards: half of an older calibration beside a new one would be believed.
-    check_folder(folder)
-    output_folder(folder)
-    earlier = earlier_results(folder)
-    names = _RESULTS if found.posterior is not None else _RESULTS[:2]
-    written = [folder / name for name in names]
-    with atomic_write_all({path: _begins(path) for path in written}) as parts:
-        parts[written[0]].write_text(calibration_text(found), encoding="utf-8")
-        parts[written[1]].write_text(predictions_text(found), encoding="utf-8")
-        if found.posterior is not None:
-            write_posterior(posterior_tree(found), parts[written[2]])
-    for path in earlier:
-        if path not in written:
-            path.unlink(missing_ok=True)
+    """Write all files of a calibration, all or none of them; return it with their names."""
+    # All are made before the first takes the place of an earlier calibration's, and what that one had more goes
+    # afterwards: half of an older calibration beside a new one would be believed.
+    drawings: Drawings = {}
     if figures:
         from spirillum.view.figures.calibration import calibration_drawings
 
         drawings = calibration_drawings(found)
-        drawn = draw_together(
-            drawings,
-            output_folder(folder / "figures", folder),
-            lambda name, done: tell(progress, f"figure {name}", done, len(drawings)),
-            vector=vector,
-            again=partial(calibration_drawings, found),
-            beside=beside,
-        )
-        written += [path for paths in drawn.values() for path in paths]
+        output_folder(output_folder(folder) / "figures", folder)
+    check_folder(output_folder(folder))
+    earlier = earlier_results(folder)
+    names = _RESULTS if found.posterior is not None else _RESULTS[:2]
+    endings = ("png", "svg") if vector else ("png",)
+    pictures = [folder / "figures" / f"{name}.{ending}" for name in drawings for ending in endings]
+    written = [*(folder / name for name in names), *pictures]
+    with atomic_write_all({path: _begins(path) for path in written}, earlier=earlier) as parts:
+        parts[written[0]].write_text(calibration_text(found), encoding="utf-8")
+        parts[written[1]].write_text(predictions_text(found), encoding="utf-8")
+        if found.posterior is not None:
+            write_posterior(posterior_tree(found), parts[written[2]])
+        if pictures:
+            draw_together(
+                drawings,
+                parts[pictures[0]].parent,
+                lambda name, done: tell(progress, f"figure {name}", done, len(drawings)),
+                vector=vector,
+                again=partial(calibration_drawings, found),
+                beside=beside,
+            )
     files = sorted(str(path.relative_to(folder)) for path in written)
     gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
     said = [Note("files", f"{folder} held an earlier calibration: its {gone} are gone")] if gone else []
