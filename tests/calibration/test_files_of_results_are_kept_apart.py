@@ -20,6 +20,13 @@ def found(made: Callable[..., Path]) -> Any:
     return sp.calibrate(made(**small, seed=4), WIDE, method="least-squares", model="sbt")
 
 
+@pytest.mark.parametrize("name", ["calibration.toml", "predictions.csv", "posterior.nc"])
+def test_a_link_to_another_result_is_refused_before_any_work(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).symlink_to("../missing")
+    with pytest.raises(InputError, match=f"{name} is a link; allowed: a file of its own"):
+        sp.calibrate("missing.csv", WIDE, tmp_path)
+
+
 def small_drawings(_found: Any) -> dict[str, Any]:
     from matplotlib.figure import Figure
 

@@ -161,6 +161,25 @@ def test_a_planted_link_at_a_temporary_name_is_not_followed(tmp_path: Path) -> N
         output_folder(tmp_path / "out" / "figures", tmp_path / "out")
 
 
+@pytest.mark.parametrize("target", ["../other/a.json", "../missing", "b.json", "figures"])
+@pytest.mark.parametrize("name", ["a.json", "figures/a.json"])
+def test_no_link_within_a_folder_of_results_is_followed(tmp_path: Path, name: str, target: str) -> None:
+    (tmp_path / "out" / "figures").mkdir(parents=True)
+    (tmp_path / "other").mkdir()
+    for own in ("other/a.json", "out/b.json"):
+        write_text(tmp_path / own, MARK)
+    (tmp_path / "out" / name).symlink_to(target)
+    (tmp_path / "named").symlink_to("out")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for folder in ("out", "named"):
+        with results_folder(tmp_path / folder) as results:
+            with pytest.raises(InputError, match=r"a\.json is a link; allowed: a file of its own in"):
+                write_text(results / name, "new", replace="any")
+            write_text(results / "c.json", MARK)
+            (results / "c.json").unlink()
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
 def test_two_runs_in_one_folder_are_kept_apart(tmp_path: Path) -> None:
     with (
         results_folder(tmp_path / "out") as folder,

@@ -116,6 +116,18 @@ def test_dataset_of_another_version_is_computed_anew(small: dict[str, object], t
     assert json.loads((tmp_path / "b" / "study.json").read_text())["title"] == "Four tails"
 
 
+@pytest.mark.parametrize("name", ["dataset.nc", "ranking.csv", "claims.json"])
+def test_a_rerun_follows_no_link_into_another_study(small: dict[str, object], tmp_path: Path, name: str) -> None:
+    for title in ("a", "b"):
+        sp.study({**small, "title": title}, output=tmp_path / title, figures=False)
+    before = (tmp_path / "b" / name).read_bytes()
+    (tmp_path / "a" / name).unlink()
+    (tmp_path / "a" / name).symlink_to(f"../b/{name}")
+    with pytest.raises(sp.InputError, match=f"{name} is a link; allowed: a file of its own"):
+        sp.study({**small, "title": "a"}, output=tmp_path / "a", figures=False)
+    assert (tmp_path / "b" / name).read_bytes() == before
+
+
 @pytest.mark.parametrize("name", ["dataset.nc", "ranking.csv", "claims.json", "report.html"])
 def test_a_foreign_file_in_a_folder_of_a_study_is_refused_before_the_work(
     small: dict[str, object], tmp_path: Path, name: str

@@ -41,6 +41,7 @@ _HEAD, _TAIL = 1 << 16, 1 << 12
 _ANYTHING = "a file name"
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
+_open_folders: list[Path] = []  # folders of results that are being written, by any thread
 
 
 def written_by_us(path: Path, begins: bytes = b"") -> bool:
@@ -74,6 +75,9 @@ def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"")
         there, wrong = real.exists(), real.exists() and not real.is_file()
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{str(path)[:200]!r} cannot be written; allowed: {_ANYTHING}") from error
+    for folder in _open_folders:
+        if path.is_relative_to(folder) and real != folder.resolve() / path.relative_to(folder):
+            raise InputError(f"{path} is a link; allowed: a file of its own in {folder}")
     if wrong:
         raise InputError(f"{path} is not a regular file; allowed: a new file, or one to replace")
     if not there:
@@ -312,6 +316,7 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file, no folder for results; allowed: a folder for the results (-o DIR)")
     missing = [place for place in (folder / "figures", folder, *folder.parents) if not place.exists()]
+    _open_folders.append(folder)
     try:
         with locked(output_folder(folder)):
             if (folder / "figures").exists():
@@ -324,6 +329,7 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
             f"{folder} is being written by another run; allowed: another folder (-o DIR), or to wait for it"
         ) from error
     finally:
+        _open_folders.remove(folder)
         for made in missing:
             with suppress(OSError):
                 made.rmdir()  # only where it is empty

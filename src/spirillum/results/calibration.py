@@ -118,7 +118,7 @@ def earlier_results(folder: Path) -> list[Path]:
 
 def check_folder(folder: Path) -> None:
     """Refuse a folder for results before any work is done."""
-    for path in earlier_results(folder):
+    for path in (*(folder / name for name in _RESULTS), *earlier_results(folder)):
         check_replaceable(path, begins=_begins(path))
 
 
