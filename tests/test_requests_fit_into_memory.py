@@ -11,6 +11,7 @@ import pytest
 import spirillum as sp
 from spirillum.cli.app import command_line
 from spirillum.errors import MOST_MEMORY, check_memory
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.surface import corner_normals
 
@@ -45,6 +46,11 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "slow field": (lambda: sp.magnetic_sweep("magnetic-helix", ["1e-9 Hz"], model="rft"), "turns near step-out"),
     "table in a vast tube": (lambda: sp.prepare(robot(VAST)), "GiB of equations"),
     "mesh": (lambda: robot_mesh(robot(COIL), fineness=5.0), "turns .fineness = 5. makes .* triangles"),
+    "view as a column": (
+        lambda: RobotBatch.of(robot({})).with_values({"tail.wavelength": np.broadcast_to(0.02, (10**12,))}),
+        "tail.wavelength makes .* numbers",
+    ),
+    "view as rows": (lambda: RobotBatch.of(robot({})).taken(np.broadcast_to(0, (10**12,))), "rows makes .* numbers"),
     "long run": (
         lambda: sp.control(
             WIDE,

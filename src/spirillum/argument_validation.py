@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Set
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
-from spirillum.errors import ArgumentError, InputError, clipped, did_you_mean
+from spirillum.errors import ArgumentError, InputError, check_memory, clipped, did_you_mean
 from spirillum.scalars import is_number, is_true_or_false, is_whole
 
 if TYPE_CHECKING:
@@ -163,7 +163,11 @@ def _array_of(name: str, value: Any, kinds: str, allowed: str) -> np.ndarray:
         raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}") from error
     if found.dtype.kind not in kinds or np.any(np.ma.getmask(value)):
         raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")
+    check_memory(name, found.size, "numbers", _NUMBER, "in several requests")
     return found
+
+
+_NUMBER = 24.0  # A number as a float, its size, and what is true of it, bytes; a view of one value has taken none yet.
 
 
 def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:
