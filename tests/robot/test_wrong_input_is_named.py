@@ -1,6 +1,7 @@
 """Every kind of wrong input ends in one sentence that names the field or file, its value, and what is allowed."""
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -329,3 +330,37 @@ def is_a_robot_or_an_input_error(overrides: dict[str, Any]) -> None:
 def test_a_bound_that_is_missed_by_little_is_told_from_the_value() -> None:
     limit = Limit.of("Reynolds number", np.array([0.1, 0.100004]), "at most", 0.1, "1", "inertia is left out", "re")
     assert limit.sentence(1) == "Reynolds number = 0.100004; allowed: at most 0.1, because inertia is left out"
+
+
+@pytest.mark.parametrize(
+    ("lowest", "sentence"),
+    [
+        ('[tail]\nwavelength = "20"', 'tail.wavelength = "20" has no unit'),
+        ("[tail]\nwavelength = nan", "tail.wavelength = nan"),
+        ('[tail]\nwavelength = "1 km"', 'tail.wavelength = "1 km" is out of range'),
+        ("[tail]\npitch = 3", "tail.pitch is not a known field"),
+        ("foo = 3", "foo is not a known field"),
+        ("[model.rft]\nfoo = 3", "model.rft.foo is not a known field"),
+        ('[drive]\nkind = "rate"', "drive.rate is missing with drive.kind = 'rate'"),
+        ('[channel]\ndiameter = "10 mm"', "body.diameter = 17 mm; allowed: less than 10 mm"),
+    ],
+)
+def test_the_file_of_a_chain_is_named_in_which_a_wrong_field_stands(tmp_path: Path, lowest: str, sentence: str) -> None:
+    base, middle, top = (tmp_path / f"{name}.toml" for name in ("base", "middle", "top"))
+    base.write_text(f'extends = "biorob2012-wide"\n{lowest}\n[body]\ndiameter = "17 mm"\n')
+    middle.write_text('extends = "base.toml"\n[tail]\namplitude = "3 mm"\n')
+    top.write_text('extends = "middle.toml"\n[fluid]\nviscosity = "2 Pa s"\n')
+    with pytest.raises(InputError) as refused:
+        load(top)
+    assert str(refused.value).startswith(f"{top}: extends: {middle}: extends: {base}: {sentence}")
+    with pytest.raises(InputError) as refused:
+        load(top, **{"tail.length": 3})
+    assert f"{top}: tail.length = 3 has no unit" in str(refused.value.problems)
+
+
+def test_two_files_of_a_chain_that_do_not_fit_are_named_by_the_upper_one(tmp_path: Path) -> None:
+    base, top = tmp_path / "base.toml", tmp_path / "top.toml"
+    base.write_text('extends = "biorob2012-wide"\n[body]\ndiameter = "17 mm"\n')
+    top.write_text('extends = "base.toml"\n[channel]\ndiameter = "10 mm"\n')
+    with pytest.raises(InputError, match=f"^{re.escape(str(top))}: body.diameter = 17 mm; allowed: less than 10 mm"):
+        load(top)

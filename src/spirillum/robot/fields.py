@@ -213,12 +213,18 @@ def refuse(*sentences: str) -> PydanticCustomError:
     return PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(sentences)})
 
 
-def refused_table(problems: Sequence[str], source: str = "") -> InputError:
-    """All problems of a table as one error: the first as its sentence, the fields of the others by name."""
-    every = [f"{source}: {problem}" for problem in problems] if source else list(problems)
+def field_of(problem: str) -> str:
+    """The field with which a problem's sentence begins."""
+    return re.split(r"[^\w.-]", problem, maxsplit=1)[0][:_LONGEST_FIELD]
+
+
+def refused_table(problems: Sequence[str], source: str | Callable[[str], str] = "") -> InputError:
+    """All problems of a table, or of files, as one error: the first as its sentence, the others' fields by name."""
+    files = [source if isinstance(source, str) else source(problem) for problem in problems]
+    every = [f"{file}: {problem}" if file else problem for file, problem in zip(files, problems, strict=True)]
     if len(problems) == 1:
         return InputError(every[0])
-    fields = [re.split(r"[^\w.-]", problem, maxsplit=1)[0][:_LONGEST_FIELD] for problem in problems[1:]]
+    fields = [field_of(problem) for problem in problems[1:]]
     named = ", ".join(fields[:_MOST_NAMED]) + (", ..." if len(fields) > _MOST_NAMED else "")
     return InputError(f"{every[0]} (and {len(fields)} more: {named})", every)
 

@@ -10,14 +10,14 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean, led_by
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.notes import Note
 from spirillum.robot.arguments import check_set_once
-from spirillum.robot.fields import field_values, problems_in, refused_table
+from spirillum.robot.fields import field_of, field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.robot.shape_input import DISPLACED, FILES, smoothing_notes, with_points_of_files
@@ -98,13 +98,14 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
     check_set_once(overrides)
     table, source = raw_table(robot)
     folder = Path() if isinstance(robot, Mapping) else Path(robot).parent
-    table, changes = _extended(with_points_of_files(table, folder, source), source, folder)
+    table, layers = _extended(with_points_of_files(table, folder, source), source, folder)
     for path, value in overrides.items():
         _displace(table, _nested(path, value))
         _set_field(table, path.split("."), value, path)
     table = with_points_of_files(table, Path(), source)
-    changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
-    robot = _checked(table, source, tuple(_stale(table, changes)))
+    layers.append(_Layer(source, set().union(*(_paths(_nested(path, value)) for path, value in overrides.items()))))
+    changes = [layer.fields for layer in layers[1:]]
+    robot = _checked(table, layers, tuple(_stale(table, changes)))
     robot._warnings = (*robot.warnings, *_old_coupling(robot, changes))  # noqa: SLF001 - it is the loader's to set
     return robot
 
@@ -190,22 +191,29 @@ def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | N
     return robot.model_copy(update={"model": options})
 
 
+class _Layer(NamedTuple):
+    """A robot file of a chain, or its overrides."""
+
+    source: str  #: Its name after those of the files that lead to it.
+    fields: set[str]  #: The fields and tables that it sets, by their dotted names.
+
+
 def _extended(
     table: dict[str, Any], source: str, folder: Path, above: tuple[Path, ...] = ()
-) -> tuple[dict[str, Any], list[set[str]]]:
-    """Merge the table over what its `extends` names; return the tables, and the fields that each layer has changed."""
+) -> tuple[dict[str, Any], list[_Layer]]:
+    """Merge the table over what its `extends` names; return the tables, and the layers from the lowest on."""
     base = table.pop("extends", None)
+    own_layer = _Layer(source, _paths(table))
     if base is None:
-        return table, []
+        return table, [own_layer]
     own = isinstance(base, str) and base.endswith(".toml")
     if not own and (not isinstance(base, str) or base not in shipped_robots()):
         hint = did_you_mean(str(base), shipped_robots())
         allowed = f"{', '.join(preset_names())}, or a robot file (.toml) beside this one"
         raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {allowed}")
-    changed = _touched(table)
     if not own:
         below, layers = _extended(tomllib.loads(preset_text(base)), f"preset {base}", folder, above)
-        return _merge_tables(below, base, table), [*layers, changed]
+        return _merge_tables(below, base, table), [*_led(layers, source), own_layer]
     path = folder / base
     if len(above) >= _MOST_LAYERS or _resolved(path, source) in above:
         raise InputError(
@@ -215,7 +223,11 @@ def _extended(
     with led_by(f"{source}: extends"):
         under = with_points_of_files(read_toml(path, _WHAT), path.parent, str(path))
         below, layers = _extended(under, str(path), path.parent, (*above, _resolved(path, source)))
-    return _merge_tables(below, base, table), [*layers, changed]
+    return _merge_tables(below, base, table), [*_led(layers, source), own_layer]
+
+
+def _led(layers: Sequence[_Layer], source: str) -> Iterator[_Layer]:
+    return (layer._replace(source=f"{source}: extends: {layer.source}") for layer in layers)
 
 
 def _merge_tables(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[str, Any]:
@@ -294,6 +306,22 @@ def _touched(table: Mapping[str, Any]) -> set[str]:
     }
 
 
+def _paths(table: Mapping[str, Any], under: str = "") -> set[str]:
+    """Dotted names of all tables and fields."""
+    found = {f"{under}{name}" for name in table}
+    if under.count(".") < _DEEPEST:
+        inner = ((name, value) for name, value in table.items() if isinstance(value, Mapping))
+        found.update(*(_paths(value, f"{under}{name}.") for name, value in inner))
+    return found
+
+
+def _source_of(problem: str, layers: Sequence[_Layer]) -> str:
+    """The topmost layer that sets a field of a problem; of an unknown one the field itself, not its remedy."""
+    others = [] if "is not a known field" in problem else re.findall(r"\w+(?:\.\w+)+", problem)
+    named = {field_of(problem), *others}
+    return next((layer.source for layer in reversed(layers) if named & layer.fields), layers[-1].source)
+
+
 def _older(changes: Sequence[set[str]], field: str, than: Sequence[str]) -> list[str]:
     """The fields among `than` that layers have changed since one set a field."""
     newer: list[str] = []
@@ -347,10 +375,10 @@ def _doubts(robot: Robot) -> Iterator[Note]:
     yield from smoothing_notes(robot.tail.form)
 
 
-def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> Robot:
+def _checked(table: dict[str, Any], layers: Sequence[_Layer], warnings: tuple[Note, ...]) -> Robot:
     robot = problems_in(Robot, table)
     if not isinstance(robot, Robot):
-        raise refused_table(robot, source)
+        raise refused_table(robot, lambda problem: _source_of(problem, layers))
     robot._warnings = (*warnings, *_doubts(robot))  # noqa: SLF001 - it is the loader's to set
     return robot
 
