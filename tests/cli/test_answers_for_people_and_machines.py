@@ -145,6 +145,11 @@ def test_a_check_says_which_models_have_no_answer(run: Callable[..., Any]) -> No
     assert (outcome.code, answer["valid"]) == (0, True)
     said = [line.split(":")[0] for line in answer["warnings"] if line.startswith("model")]
     assert said == [f"model '{name}' has no answer for it" for name in ("slender", "tube")]
+    water = "--set", "channel=none", "--set", "fluid.viscosity=0.00026Pas"
+    said = json.loads(run("robot", "check", "biorob2012-wide", *water, "--json").out)["warnings"]
+    assert [words.partition(": Reynolds number (body diameter) = ")[0] for words in said] == [
+        f"model '{name}' has no answer for it" for name in ("sbt", "rft", "slender")
+    ]
     assert json.loads(run("robot", "check", "biorob2012-wide", "--json").out)["warnings"] == []
 
 

@@ -23,7 +23,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model, quickest
 from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import in_tube
-from spirillum.fluid.tube.library import TabledTube, find_table, has_table_cache, prepared_tables
+from spirillum.fluid.tube.library import TabledTube, find_table, has_table_cache, prepared_tables, tabled
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import RESPONSES, STAGES, StageName, stage_of
 from spirillum.fluid.tube.table import TubeTable
@@ -33,12 +33,13 @@ from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note
 from spirillum.progress import Progress
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken
+from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken, reynolds_limits, stokes_flow_problem
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import ModelOptions, Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
+from spirillum.swimming.steady import swim
 from spirillum.units import show, show_apart
 
 AUTO = "auto"  #: Name that leaves the choice of the model to `choose_model`.
@@ -84,16 +85,25 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
 
 
 def models_without_answer(robot: Robot) -> list[str]:
-    """A sentence on each model whose domain does not contain the robot, level in its channel."""
+    """A sentence on each model that refuses the robot, level in its channel: for its sizes, or for its own motion."""
     batch = RobotBatch.of(robot)
     found = []
     for name, model in SWIMMER_MODELS.items():
         if model.placed and robot.channel is None:
             continue
         outside = broken(model.requirements(batch))
-        if outside:
-            found.append(f"model '{name}' has no answer for it: {outside[0].sentence()}")
+        if problem := outside[0].sentence() if outside else _beyond_stokes(batch, model):
+            found.append(f"model '{name}' has no answer for it: {problem}")
     return found
+
+
+def _beyond_stokes(batch: RobotBatch, model: SwimmerModel) -> str:
+    """Why a model refuses a robot's motion by its drive; empty where it does not, or would solve for long to know."""
+    quick = tabled(batch) if model.placed else model
+    if batch.drive is None or quick is None:
+        return ""
+    found = swim(batch, quick)
+    return stokes_flow_problem(batch, reynolds_limits(batch, found.reynolds_number, found.tail_reynolds_number))
 
 
 def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:
