@@ -234,7 +234,7 @@ def test_walls_that_a_model_leaves_out_are_said(batch_of: Callable[..., Any]) ->
         assert [note.code for note in swim(robot, model).notes] == ["walls-left-out"]
     assert swim(robot, "sbt", calibrated=False).notes != swim(robot, "sbt").notes
     assert swim(robot, "tube").notes == ()
-    assert swim(batch_of(channel=None), "rft").notes == ()
+    assert swim(batch_of(channel=None), "rft", calibrated=False).notes == ()
 
 
 @pytest.mark.parametrize("model", MODELS)
