@@ -2,7 +2,9 @@
 
 import ast
 from pathlib import Path
+from typing import Any, cast
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -66,6 +68,33 @@ def test_a_released_motion_prints_its_quantities_or_why_there_is_none() -> None:
     assert repr(trial) == f"ReleasedMotion(U_x = {speed})"
     assert str(trial).splitlines()[:2] == ["released motion", f"  forward velocity     {speed}"]
     assert str(none) == "the robot has no channel in which it could be released"
+
+
+def test_a_band_prints_the_limits_of_its_quantities() -> None:
+    found = sp.predict("biorob2012-wide", motion="held").band
+    assert found is not None
+    speed, low, high = (
+        1e3 * value for value in (found.reference.forward_velocity[0], *found.limits("forward_velocity"))
+    )
+    assert repr(found) == f"Band(U_x = {speed:.4g} mm/s)"
+    lines = str(found).splitlines()
+    assert lines[0] == "band"
+    assert f"{speed:.4g} mm/s ({low:.4g} to {high:.4g})" in lines[1]
+    assert lines[-2:] == ["  over: gap and pitch", "  poses: 9"]
+
+
+def test_an_answer_in_a_line_is_never_empty() -> None:
+    from spirillum.calibration.ranking import ModelRank, Ranking
+
+    nothing = np.empty(0)
+    ranked = tuple(ModelRank(name, *(0.0,) * 4, nothing, nothing, cast("Any", None)) for name in ("rft", "sbt"))
+    assert repr(Ranking(ranked, ())) == "Ranking(rft, sbt)"
+
+    class Answer(DisplayMixin):
+        def to_dict(self) -> dict[str, Any]:
+            return {"schema": "spirillum.any/1", "folder": "out", "rows": 3}
+
+    assert repr(Answer()) == "Answer(folder = out, rows = 3)"
 
 
 def test_comparison_and_resistance_print_their_numbers() -> None:

@@ -98,6 +98,7 @@ class DisplayMixin:
                 symbol = QUANTITIES[name].symbol if name in QUANTITIES else rows[0].name
                 words.append(f"{symbol} = {rows[0].value} {rows[0].unit}".rstrip())
                 break
+        words = words or [f"{name} = {text}" for name, text in _words(answer)[:2]]
         return f"{type(self).__name__}({', '.join(words)})"
 
     def __str__(self) -> str:

@@ -71,6 +71,10 @@ class Ranking(DisplayMixin):
     warnings: tuple[Note, ...]
     model_reason: str = ""  #: Why these models were ranked; empty where they were named.
 
+    def __repr__(self) -> str:
+        """The models in their order."""
+        return f"Ranking({', '.join(item.model for item in self.ranked)})"
+
     @property
     def best(self) -> ModelRank:
         """The model that predicts left-out robots best."""

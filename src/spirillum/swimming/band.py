@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import PerRobot
+from spirillum.display import DisplayMixin
 from spirillum.envelope import quantity
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.domain import WIRE_FILM, in_tube
@@ -48,8 +49,8 @@ _SLACK = 1.0 + 1e-6  # rounding must not carry the steepest pose out of the doma
 _SWEPT = 129  # rings of what the tail sweeps in a turn
 
 
-@dataclass(frozen=True)
-class Band:
+@dataclass(frozen=True, repr=False)
+class Band(DisplayMixin):
     """Steady swimming of one robot at the poses that its placement leaves open, SI."""
 
     over: tuple[str, ...]  #: Fields of the placement that it goes over: `gap`, `pitch` or both.
@@ -86,6 +87,14 @@ class Band:
         return found | {
             name: quantity(column, QUANTITIES[name].unit) for name, column in self.swimming.quantities.items()
         }
+
+    def _display_content(self) -> tuple[dict[str, Any], None]:
+        """See `DisplayMixin`: each quantity at the reference pose, with its limits over all poses."""
+        content = {"schema": "spirillum.band/1", "over": " and ".join(self.over), "poses": self.gap.size}
+        return content | {
+            name: quantity(column[0], QUANTITIES[name].unit, **self.of(name))
+            for name, column in self.reference.quantities.items()
+        }, None
 
 
 def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
