@@ -6,6 +6,7 @@ import pytest
 
 from spirillum.errors import InputError
 from spirillum.files import claim_folder, new_file
+from spirillum.files.reading import DAMAGED
 
 MARK = {"fingerprint": "a", "title": "first"}
 
@@ -44,10 +45,10 @@ def test_the_same_question_resumes_and_another_is_refused(tmp_path: Path) -> Non
     assert (folder / "mark.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '"fingerprint"'])
-def test_a_damaged_mark_is_refused(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '"fingerprint"', '{"a": 1}'])
+def test_a_damaged_or_foreign_mark_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "mark.json").write_text(text)
-    with pytest.raises(InputError, match=r"mark\.json is damaged; allowed: a new folder"):
+    with pytest.raises(InputError, match=rf"mark\.json {DAMAGED}; allowed: to move it away, or a new folder"):
         claim_folder(tmp_path, "mark.json", MARK, "study")
 
 

@@ -9,6 +9,7 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.files import results_folder
+from spirillum.files.reading import DAMAGED
 from spirillum.results.calibration import check_folder, earlier_results, write_calibration
 
 WIDE = "biorob2012-wide"
@@ -38,7 +39,7 @@ def test_a_file_that_no_calibration_wrote_is_refused_and_stays(found: Any, tmp_p
     foreign = tmp_path / name
     foreign.parent.mkdir(exist_ok=True)
     foreign.write_bytes(b"my own\n")
-    with pytest.raises(InputError, match=f"{name} is there and of unknown origin, not written by spirillum; allowed"):
+    with pytest.raises(InputError, match=f"{name} is there and of unknown origin: it {DAMAGED}; allowed"):
         check_folder(tmp_path)
     with pytest.raises(InputError, match="unknown origin"):
         write_calibration(found, tmp_path, figures=False)

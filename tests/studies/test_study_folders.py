@@ -1,6 +1,7 @@
 """A study's folder: resumes after an interruption, and is refused to another study."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -133,6 +134,12 @@ def test_a_foreign_file_in_a_folder_of_a_study_is_refused_before_the_work(
     small: dict[str, object], tmp_path: Path, name: str
 ) -> None:
     sp.study(small, output=tmp_path, figures=False)
+    if name == "dataset.nc":  # one's own, cut off
+        os.truncate(tmp_path / name, (tmp_path / name).stat().st_size // 2)
+        with pytest.raises(
+            sp.InputError, match=r"dataset\.nc is there and of unknown origin: it is damaged, cut off, or"
+        ):
+            sp.study(small, output=tmp_path)
     (tmp_path / "dataset.nc").unlink()
     (tmp_path / name).write_text("rank;robot\n" if name == "ranking.csv" else "{}")
     with pytest.raises(sp.InputError, match=f"{name} is there and of unknown origin"):

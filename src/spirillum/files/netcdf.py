@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_NETCDF, MOST_VARIABLES
-from spirillum.files.reading import opened
+from spirillum.files.reading import DAMAGED, opened
 from spirillum.files.writing import Replace, atomic_write
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import h5py
     import xarray as xr
 
-DAMAGED = "is damaged, cut off, or of another program"  #: Why a file of results cannot be read.
 _BEGINS = b"\x89HDF\r\n\x1a\n"
 _DEEPEST = 6
 _LONGEST_TEXTS = 64 << 20

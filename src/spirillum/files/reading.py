@@ -19,6 +19,7 @@ from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS, checked_path
 from spirillum.scalars import plain_minus
 
+DAMAGED = "is damaged, cut off, or of another program"  #: Why a file of results cannot be read.
 _LINE = re.compile(r"at line (\d+)")
 _STRING = re.compile(r'"((?:[^"\\\n]|\\.)*)("|$)')
 _KEY = re.compile(r"\s*(?P<key>[\w.\"'-]+)\s*=\s*(?P<value>.*)")
@@ -164,7 +165,7 @@ def read_json(path: str | Path, what: str) -> Any:
     text = read_text(path, what)
     with suppress(ValueError, RecursionError):
         return json.loads(text)
-    raise InputError(f"{path} is damaged; allowed: {what}")
+    raise InputError(f"{path} {DAMAGED}; allowed: {what}")
 
 
 def parse_toml(text: str, source: str, what: str) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from spirillum.envelope import as_json
 from spirillum.errors import InputError
 from spirillum.files.limits import checked_path
 from spirillum.files.locks import LEFTOVER, Busy, locked, private_folder
-from spirillum.files.reading import read_json
+from spirillum.files.reading import DAMAGED, read_json
 
 PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
 """Endings of the pictures that can be written, for `output_target`."""
@@ -89,8 +89,8 @@ def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"")
     try:
         if replace == "own" and not written_by_us(real, begins):
             raise InputError(
-                f"{path} is there and of unknown origin, not written by spirillum; allowed: another name or folder, "
-                "or to move it away"
+                f"{path} is there and of unknown origin: it {DAMAGED}; allowed: another name or folder, or to move it "
+                "away"
             )
     except OSError as error:
         raise InputError(f"{path} is there and cannot be read ({error.strerror}); allowed: another name") from error
@@ -344,7 +344,9 @@ def claim_folder(
             found = read_json(folder / mark, f"the mark of a {what}")
             same, title = found["fingerprint"] == content["fingerprint"], str(found.get("title", ""))[:80]
         except (KeyError, TypeError, AttributeError, InputError) as error:
-            raise InputError(f"{folder / mark} is damaged; allowed: a new folder (-o DIR)") from error
+            raise InputError(
+                f"{folder / mark} {DAMAGED}; allowed: to move it away, or a new folder (-o DIR)"
+            ) from error
         if not same:
             named = f" ('{title}')" if title else ""
             raise InputError(

@@ -18,7 +18,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.files.limits import checked_path
 from spirillum.files.locks import private_folder
-from spirillum.files.netcdf import DAMAGED
+from spirillum.files.reading import DAMAGED
 from spirillum.files.writing import synced
 
 if TYPE_CHECKING:

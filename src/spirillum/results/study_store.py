@@ -16,6 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import is_whole, opened_store, read_json, results_folder, store_files, store_target, write_pieces
+from spirillum.files.reading import DAMAGED
 from spirillum.notes import note_attributes, notes_in
 from spirillum.optional_dependencies import import_optional
 from spirillum.studies.dataset import described
@@ -134,7 +135,7 @@ def _note_of(path: Path) -> _Note:
     try:
         return _NOTE.validate_python(found)
     except ValidationError as error:
-        raise InputError(f"{path} is damaged; allowed: {what}") from error
+        raise InputError(f"{path} {DAMAGED}; allowed: {what}") from error
 
 
 def _outcome_of(folder: Path) -> _Outcome | None:
