@@ -182,6 +182,14 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
         motion_of_run(sp.load(ROBOT), run, TrialOptions(duration="0.7 s"), CameraOptions())
 
 
+def test_a_robot_that_its_loader_warned_of_is_filmed_in_its_own_run(tmp_path: Path) -> None:
+    robot = sp.load(ROBOT, **{"body.diameter": "12 mm"})
+    assert robot.warnings
+    run = sp.simulate(robot, model="rft", motion="held", timing={"duration": "0.3 s"})
+    short = {"trial": {"duration": "0.2 s"}, "camera": {"size": (160, 120)}}
+    assert render(robot, tmp_path / "a.mp4", run=run, **short).robot == robot
+
+
 @pytest.mark.parametrize("view", ["top", "side"])
 @pytest.mark.parametrize("leftwards", [False, True])
 def test_the_trajectory_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -> None:

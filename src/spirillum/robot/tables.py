@@ -230,6 +230,13 @@ class RobotTables(Section):
 
     _warnings: tuple[Note, ...] = PrivateAttr(default=())
 
+    def __eq__(self, other: object) -> bool:
+        """Whether all fields are equal; what was doubtful when one of them was loaded does not count."""
+        names = type(self).model_fields
+        return type(other) is type(self) and all(getattr(self, name) == getattr(other, name) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]  # one of its fields is a dict
+
     @property
     def warnings(self) -> tuple[Note, ...]:
         """What was doubtful in the input."""
