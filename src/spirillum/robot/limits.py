@@ -71,7 +71,8 @@ class Limit(NamedTuple):
 
     def caution(self, index: int = 0) -> Note:
         """The note where an answer is given although the requirement is broken, for robot number `index`."""
-        return Note(caution_code(self.flag), self._statement(index, "accurate"), (self.field,))
+        code = "inertia" if self.flag.endswith("reynolds-number") else "outside-validity"
+        return Note(code, self._statement(index, "accurate"), (self.field,))
 
     def sentence(self, index: int = 0) -> str:
         """Message about the violated requirement, for robot number `index`."""
@@ -89,11 +90,6 @@ class Limit(NamedTuple):
             return f"{lack}; {word}: a robot with a {name}, because {self.why}"
         said, allowed = show_apart(float(value), float(bound), self.unit)
         return f"{self.field} = {said}; {word}: {self.relation} {allowed}, because {self.why}"
-
-
-def caution_code(flag: str) -> str:
-    """Code of the note on a broken requirement of accuracy, by its flag."""
-    return "inertia" if flag.endswith("reynolds-number") else "outside-validity"
 
 
 def broken(limits: Iterable[Limit]) -> list[Limit]:
