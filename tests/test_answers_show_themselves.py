@@ -2,7 +2,7 @@
 
 import ast
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,10 +84,11 @@ def test_a_band_prints_the_limits_of_its_quantities() -> None:
 
 
 def test_an_answer_in_a_line_is_never_empty() -> None:
+    from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.ranking import ModelRank, Ranking
 
-    nothing = np.empty(0)
-    ranked = tuple(ModelRank(name, *(0.0,) * 4, nothing, nothing, cast("Any", None)) for name in ("rft", "sbt"))
+    nothing, fit = np.empty(0), object.__new__(Calibrated)
+    ranked = tuple(ModelRank(name, *(0.0,) * 4, nothing, nothing, fit) for name in ("rft", "sbt"))
     assert repr(Ranking(ranked, ())) == "Ranking(rft, sbt)"
 
     class Answer(DisplayMixin):
