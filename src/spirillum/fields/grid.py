@@ -130,7 +130,9 @@ def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolu
             f"{name} = {resolution} makes {size} points; allowed: at most {_MOST_POINTS} points, here a {name} of "
             f"{most}"
         )
-    even = {axis: _even(0.5 * (low + high), spacing, counts[axis]) for axis, (low, high) in box.items()}
+    # One spacing for all axes: no direction is resolved better than another.
+    steps = {axis: spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1)) for axis, count in counts.items()}
+    even = {axis: 0.5 * (low + high) + steps[axis] for axis, (low, high) in box.items()}
     x, y, z = ({**even, **fixed}[axis] for axis in _AXES)
     return PointGrid((x, y, z))
 
@@ -140,11 +142,6 @@ def _sizes(box: dict[str, tuple[float, float]], resolution: int) -> tuple[float,
     spacing = max(high - low for low, high in box.values()) / (resolution - 1)
     counts = {axis: max(round((high - low) / spacing), 1) + 1 for axis, (low, high) in box.items()}
     return spacing, counts, math.prod(counts.values())
-
-
-def _even(centre: float, spacing: float, count: int) -> Samples:
-    """Points about a centre, with one spacing for all axes: no direction is resolved better than another."""
-    return centre + spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
 
 
 def dataset_on(

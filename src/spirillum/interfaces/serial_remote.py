@@ -128,7 +128,8 @@ class SerialRemote:
             raise InputError(f"{self.port[:80]} cannot be opened ({_reason(error)}); allowed: {_ports()}") from error
         try:
             answer = self._request("WHO").split(" ")
-            self.name, self.watchdog = _printable(answer[2]), _number_in(answer[3], 1e4) * 1e-3
+            self.name = "".join(letter for letter in answer[2] if letter.isprintable())[:40]
+            self.watchdog = _number_in(answer[3], 1e4) * 1e-3
         except InputError:
             self._line.close()
             raise
@@ -245,10 +246,6 @@ def _number_in(word: str, high: float) -> float:
     if not 0.0 <= number <= high:
         raise ValueError(word)
     return number
-
-
-def _printable(text: str) -> str:
-    return "".join(letter for letter in text if letter.isprintable())[:40]
 
 
 def _reason(error: Exception) -> str:

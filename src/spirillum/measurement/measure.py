@@ -79,7 +79,9 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
     if len(measured) == 1:
         return measured[0]
     common = NORMAL * shared if name in _LENGTHS else 0.0
-    own = [_independent(item, common * item.value) for item in measured]
+    # Half widths without the error that is common to all trials.
+    squares = [(0.5 * (item.high - item.low)) ** 2 - (common * item.value) ** 2 for item in measured]
+    own = [math.sqrt(max(square, 0.0)) for square in squares]
     mean = mean_with_interval([item.value for item in measured], LEVEL, own)
     reach = math.hypot(mean.half_width, common * mean.value)
     if name in WOBBLES:  # the error of tracking is common to all trials
@@ -88,11 +90,6 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
     if name in WOBBLES:
         low = max(low, 0.0)  # an amplitude
     return Measured(mean.value, low, mean.value + reach, measured[0].unit)
-
-
-def _independent(item: Measured, common: float) -> float:
-    """Half width of an interval without an error that is common to all trials."""
-    return math.sqrt(max((0.5 * (item.high - item.low)) ** 2 - common**2, 0.0))
 
 
 def compared(trials: Sequence[Trial]) -> list[Trial]:

@@ -75,15 +75,10 @@ def trial_figure(trial: Trial) -> Figure:
     left_out = {name: _omitted_frames(values[name], trial.fits[name]) for name, _, _ in _SERIES}
     panels[0][0].set_title(f"measured, with the fit{_omission_legend(list(left_out.values()))}", loc="left")
     panels[0][1].set_title("residuals", loc="left")
-    _say_synthetic(figure, synthetic=trial.synthetic)
+    if trial.synthetic:  # as the metadata of the video declares
+        figure.supxlabel("synthetic", x=0.99, ha="right", size=8.0, color="#9c3d00")
     figure.align_ylabels()
     return figure
-
-
-def _say_synthetic(figure: Figure, *, synthetic: bool) -> None:
-    """Mark the picture as synthetic in the lower right corner, as the video's metadata declares."""
-    if synthetic:
-        figure.supxlabel("synthetic", x=0.99, ha="right", size=8.0, color="#9c3d00")
 
 
 def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate, words: str, unit: str) -> None:

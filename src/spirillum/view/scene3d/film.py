@@ -160,7 +160,8 @@ def film(
 
     solids = DrawnRobot.of(robot)
     poses = poses_of(dataset, level_height(solids))
-    speed = _clear_speed(poses, fps) if speed is None else float(speed)
+    # Real time, or a slower speed at which the tail's turning is seen.
+    speed = min(_fastest(poses, fps), 1.0) if speed is None else float(speed)
     times = _frame_times(poses, fps, speed)
     follows = camera == "follow" or (camera == "auto" and poses.travelled > 0.5 * solids.length)
     turn, warnings = _aliasing(poses, times, speed)
@@ -292,11 +293,6 @@ def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:
             f"{round_length(poses.duration * fps / 30):g} or less"
         )
     return np.asarray(poses.time[0] + np.arange(count) * (speed / fps), dtype=float)
-
-
-def _clear_speed(poses: Poses, fps: int) -> float:
-    """Real time, or a slower speed at which the tail's turning is seen."""
-    return min(_fastest(poses, fps), 1.0)
 
 
 def _fastest(poses: Poses, fps: int) -> float:

@@ -170,7 +170,8 @@ class Video:
                 first = False
                 yield Frame(index, time, picture)
         if first:
-            raise InputError(f"{self.path} has no frame {_between(start, end)}; allowed: {VIDEO}")
+            until = "on" if end is None else f"to {end:g} s"
+            raise InputError(f"{self.path} has no frame from {start:g} s {until}; allowed: {VIDEO}")
 
     def _pictures(self, start: float) -> Iterator[tuple[int, float, Any]]:
         assert self.images is not None  # noqa: S101 - checked by the caller
@@ -369,7 +370,3 @@ def _check_size(path: Path, size: tuple[int, int]) -> None:
             f"{path} has pictures of {size[0]} x {size[1]} pixels; allowed: sides of at least {SMALLEST_SIDE} and at "
             f"most {MOST_PIXELS // 1_000_000} million pixels"
         )
-
-
-def _between(start: float, end: float | None) -> str:
-    return f"from {start:g} s on" if end is None else f"from {start:g} s to {end:g} s"
