@@ -8,6 +8,7 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.dynamics import return_map
+from spirillum.notes import notes_in
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY
 
@@ -34,6 +35,9 @@ def test_the_tail_of_a_rising_robot_touches_the_wall() -> None:
     spent = found["friction_energy"] + found["dissipated_energy"] + found["contact_energy"]
     left = found["drive_energy"] - spent - (found["potential_energy"] - found["potential_energy"][0])
     assert float(np.abs(left).max()) < 1e-6 * float(found["drive_energy"][-1])
+    # It floats, which held motion leaves out and a run does not.
+    assert "robot-floats" in {note.code for note in sp.load("biorob2012-wide", **{"body.mass": "7.0 g"}).warnings}
+    assert "robot-floats" not in {note.code for note in notes_in(found.attrs)}
 
 
 @pytest.mark.parametrize("most", [20, 400])

@@ -270,7 +270,7 @@ def free_motion(
     )
     few_turns = _FEW_TURNS * run.turn.time
     warnings = (
-        *held.warnings,
+        *(note for note in held.warnings if note.code != "robot-floats"),  # its weight acts
         *(note for note in inertia.values() if note not in held.warnings),
         *(checked.notes if lies and not stuck else ()),
         *([NO_WEIGHT] if weight and not links.weight.any() else []),

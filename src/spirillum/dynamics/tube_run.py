@@ -65,7 +65,7 @@ def tube_run(
             raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
         raise InputError(f"the run cannot be continued: {what}; allowed: a run that ended where it can go on")
     ended = float(run.time[-1])
-    notes = [*steady.warnings]
+    notes = [note for note in steady.warnings if note.code != "robot-floats"]  # its weight acts
     if ended < times.end:
         notes.append(Note.named("run-ended-early", ended=ended, end=times.end, what=run.events[-1].what))
     notes += times.notes
