@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 
 import spirillum as sp
 from spirillum.answer_entries import ENTRIES
@@ -178,6 +179,8 @@ def test_plot_draws_by_the_kind_of_answer(tmp_path) -> None:
     study = {"models": ["sbt"], "friction": ["rotor"], "robots": ["biorob2012-wide", "biorob2012-narrow"]}
     assert len(sp.plot(sp.study(study)).figure.axes) == 4
     assert sp.plot(sp.load("biorob2012-wide")).figure.axes
+    speed = sp.plot(sp.predict("biorob2012-wide", model="rft")).figure
+    assert "Speeds are upper bounds" in " ".join(text.get_text() for text in speed.findobj(Text))
     task = {"kind": "stop-at", "at": "0.2 mm", "tolerance": "0.1 mm"}
     assert len(sp.plot(sp.control("biorob2012-wide", task, plant={"model": "rft"})).figure.axes) == 3
     with pytest.raises(sp.InputError, match="answer = int has no figure"):

@@ -85,21 +85,14 @@ def test_notes_survive_processes_prefixes_and_datasets() -> None:
     assert [found.code for found in notes_in({"warnings": "of an earlier version"})] == ["remark"]
 
 
-def test_the_weightiest_cautions_take_three_rows() -> None:
-    notes = [
-        Note("outlier", "m" * 60),
-        Note("interpolated", "i"),
-        Note("walls-left-out", "w" * 150),
-        Note("outlier", "n"),
-    ]
-    assert [note.code for note in headline_cautions(notes)] == ["walls-left-out", "outlier"]
-    assert [note.code for note in headline_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
-    video = [Note(code, "v" * 100) for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
-    assert [note.code for note in headline_cautions(video)] == [
-        "robot-stands-still"
-    ]  # what it shows outweighs the rest
+def test_the_three_weightiest_cautions_are_shown() -> None:
+    codes = ("inertia", "outlier", "friction-unset", "outlier", "interpolated", "robot-floats", "pose-unknown")
+    shown = [note.code for note in headline_cautions(Note(code, "w" * 150) for code in codes)]
+    assert shown == ["pose-unknown", "robot-floats", "friction-unset"]
+    video = [Note(code, "v") for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
+    assert headline_cautions(video)[0].code == "robot-stands-still"  # what it shows outweighs the rest
 
 
 def test_a_robot_that_does_not_rest_on_the_floor_says_so_first() -> None:
     light = sp.predict(sp.load("biorob2012-wide", **{"body.mass": "6 g"}), model="tube", motion="held", band=False)
-    assert headline_cautions(light.warnings)[0].code == "robot-floats"
+    assert [note.code for note in headline_cautions(light.warnings)] == ["robot-floats", "friction-unset"]

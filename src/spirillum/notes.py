@@ -135,17 +135,10 @@ def notes_in_answer(answer: Mapping[str, Any]) -> tuple[Note, ...]:
 
 
 def headline_cautions(notes: Iterable[Note]) -> list[Note]:
-    """The weightiest cautions, one of a code, as many as fit into three rows of a terminal."""
+    """The weightiest cautions, one of a code, at most three."""
     order = list(KINDS)
     first: dict[str, Note] = {}
     for note in notes:
         if note.severity == "caution":
             first.setdefault(note.code, note)
-    shown: list[Note] = []
-    rows = 0
-    for note in sorted(first.values(), key=lambda note: order.index(note.code)):
-        rows += -(-len(f"{note.severity}: {note}") // 80)
-        if shown and rows > 3:
-            break
-        shown.append(note)
-    return shown
+    return sorted(first.values(), key=lambda note: order.index(note.code))[:3]

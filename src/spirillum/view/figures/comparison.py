@@ -383,7 +383,9 @@ def _rows(prediction: Prediction) -> Iterator[_Row]:
 
 
 def _bars(prediction: Prediction) -> Iterator[str]:
-    """Notes on the quantities that the bars show."""
+    """Notes on the quantities that marks and bars show."""
+    if any(note.code == "friction-unset" for note in prediction.warnings):
+        yield "Speeds are upper bounds: no contact friction."
     if prediction.band is not None:
         yield "Bar of the held speed: its range over the gaps and pitches that are not given."
     elif prediction.intervals is not None:
