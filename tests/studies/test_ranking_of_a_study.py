@@ -10,8 +10,9 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
+from spirillum.notes import notes_in
 from spirillum.results.study import robot_picture, write_report
-from spirillum.studies.ranking import HELD, best_in_words, ranking_of
+from spirillum.studies.ranking import HELD, TRIAL, best_in_words, ranking_of
 
 GRID = {
     "models": ["rft", "sbt"],
@@ -196,3 +197,20 @@ def test_a_ranking_of_robots_held_in_a_tube_says_so() -> None:
     assert held.message.startswith("fastest at a fixed pose: biorob2012-wide, 0.5349 mm/s")
     assert best_in_words(held.best[0].to_dict(), held=held.held).startswith("fastest at a fixed pose: biorob2012-wide")
     assert not ranking_of(sp.study({"robots": ["biorob2012-wide"], "models": ["rft"]})).held
+
+
+def test_a_caution_of_several_robots_counts_them(tmp_path: Path) -> None:
+    light = [tmp_path / f"light-{mass}.toml" for mass in (5, 6)]
+    for mass, path in zip((5, 6), light, strict=True):
+        path.write_text(f'extends = "biorob2012-wide"\nname = "{path.stem}"\n[body]\nmass = "{mass} g"\n')
+    study = sp.study({"models": ["sbt"], "friction": ["rotor"], "robots": [*map(str, light), "biorob2012-wide"]})
+    (note,) = (note for note in notes_in(study.attrs) if note.code == "robot-floats")
+    assert note.startswith("2 of 3 robots, the first: the robot floats")
+
+
+def test_a_lead_in_a_trial_stands_beside_its_error_or_says_that_none_is_stated() -> None:
+    best = {"what": "fastest in a trial", "quantity": TRIAL, "robot": "a", "alike": False, "robots": 2, "of_robots": 2}
+    best["lead"] = {"value": 0.035}
+    assert best_in_words(best).endswith("3.5 % behind (no error is stated: contact assumed, not validated)")
+    best |= {"model_error": {"value": 0.01}, "within_error": []}
+    assert best_in_words(best).endswith("3.5 % behind, the model's error is 1 %")

@@ -23,6 +23,7 @@ from spirillum.display import counted, percent
 from spirillum.envelope import quantity
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.quantities import unit_of
+from spirillum.swimming.motions import ASSUMPTION
 from spirillum.units import display_unit, in_unit, show
 
 if TYPE_CHECKING:
@@ -237,7 +238,7 @@ def _lead_in_words(best: Mapping[str, Any]) -> str:
     """By how much the best robot leads, beside the error of the model between the two."""
     lead = f"the next is {percent(best['lead']['value'])} behind"
     if "model_error" not in best:
-        return lead
+        return f"{lead} (no error is stated: {ASSUMPTION})" if best["quantity"] == TRIAL else lead
     within, error = best["within_error"], percent(best["model_error"]["value"])
     if not within:
         return f"{lead}, the model's error is {error}"

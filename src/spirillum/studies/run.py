@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -217,7 +218,8 @@ def _worth(missing: Sequence[StudyTask], pool: WorkerPool) -> WorkerPool:
 
 def warnings_of(loaded: LoadedStudy, observed: ObservedArrays | None) -> list[Note]:
     """Notes on the robots, models, fit and observations of a study."""
-    warnings = _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
+    named = ((robot.name, note) for robot in loaded.robots for note in robot.warnings)
+    warnings = _of_robots(named, len(loaded.robots))
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
         warnings.append(Note.named("friction-unset"))
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
@@ -253,12 +255,13 @@ def _pose_notes(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Not
 
 def warnings_of_calibrations(loaded: LoadedStudy) -> list[Note]:
     """What to be careful about in the robots' own calibrations."""
-    return _of_robots(
-        (robot.name, sentence)
+    named = (
+        (robot.name, note)
         for robot in loaded.robots
         for name in loaded.study.models
-        for sentence in calibration_warnings(robot, name)
+        for note in calibration_warnings(robot, name)
     )
+    return _of_robots(named, len(loaded.robots))
 
 
 def make_tables(loaded: LoadedStudy, pool: WorkerPool, progress: Progress) -> None:
@@ -295,16 +298,12 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
     ]
 
 
-_NAMED = 3  # robots that a sentence names; more are counted
-
-
-def _of_robots(named_notes: Iterable[tuple[str, Note]]) -> list[Note]:
-    """Notes with the names of their robots; one that holds for more than three robots is given once."""
-    found: dict[Note, list[str]] = {}
+def _of_robots(named_notes: Iterable[tuple[str, Note]], robots: int) -> list[Note]:
+    """Notes with the name of their robot; of those that differ in numbers alone, the first with how many robots."""
+    found: dict[str, list[tuple[str, Note]]] = {}
     for name, note in named_notes:
-        found.setdefault(note, []).append(name)
+        found.setdefault(re.sub(r"-?\d[\d.e+-]*", "", note), []).append((name, note))
     return [
-        note.prefixed(f"{whom}: ")
-        for note, names in found.items()
-        for whom in (names if len(names) <= _NAMED else [f"{len(names)} robots"])
+        alike[0][1].prefixed(f"{alike[0][0]}: " if len(alike) == 1 else f"{len(alike)} of {robots} robots, the first: ")
+        for alike in found.values()
     ]
