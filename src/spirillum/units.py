@@ -321,6 +321,6 @@ def among(value: float | None, unit: str, others: Iterable[float | None]) -> str
     return display_unit(min(sizes, default=0.0), unit)
 
 
-def in_unit(value: float | None, unit: str, shown: str) -> str:
-    """Text of an SI `value` of that `unit` in the unit `shown`, four significant digits; ``-`` for None."""
-    return "-" if value is None else f"{value if shown == unit else shown_in(value, shown):.4g}"
+def in_unit(value: float | None, unit: str, shown: str, digits: int = 4) -> str:
+    """Text of an SI `value` of that `unit` in the unit `shown`, with significant digits; ``-`` for None."""
+    return "-" if value is None else f"{value if shown == unit else shown_in(value, shown):.{digits}g}"

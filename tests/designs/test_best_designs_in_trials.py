@@ -36,6 +36,17 @@ def test_they_stand_in_a_table(thick: sp.Design) -> None:
     assert ["fluid.viscosity, Pa s", "held, mm/s", "trial, mm/s"] in headers
 
 
+def test_designs_that_nearly_agree_and_lack_a_trial_are_told_apart(thick: sp.Design) -> None:
+    answer = thick.to_dict()
+    one, two, three = answer["confirmed"]
+    two["design"]["fluid.viscosity"]["value"] = (1.0 + 1e-5) * one["design"]["fluid.viscosity"]["value"]
+    three |= {"held": {}, "trial": {"reason": "its tube has no table"}}
+    blocks = [*blocks_of(answer)]
+    (table,) = (block for block in blocks if getattr(block, "row_count", 0) == 3 and len(block.columns) == 3)
+    assert len({*table.columns[0].cells}) == 3
+    assert "-: no trial of designs: its tube has no table" in [block for block in blocks if type(block) is str]
+
+
 def test_a_tail_without_a_table_carries_its_reason() -> None:
     """And none where the tail's rate is prescribed or another model searches."""
     vary = {"tail.amplitude": "2.05 mm:2.15 mm"}

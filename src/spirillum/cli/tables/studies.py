@@ -127,10 +127,12 @@ def design(answer: Answer) -> Blocks:
     if "probability" in answer.get("uncertainty", {}):
         yield f"probability that the target is met: {_share(answer['uncertainty']['probability'])}"
     yield from _basis_of_design(answer)
-    if any("reason" not in one["trial"] for one in answer.get("confirmed", ())):
-        yield _confirmed(answer["confirmed"])
     reasons = [one["trial"]["reason"] for one in answer.get("confirmed", ()) if "reason" in one["trial"]]
-    yield from (Detail(f"no trial of designs: {reason}") for reason in dict.fromkeys(reasons))
+    tabled = len(reasons) < len(answer.get("confirmed", ()))
+    if tabled:
+        yield _confirmed(answer["confirmed"])
+    for reason in dict.fromkeys(reasons):
+        yield f"-: no trial of designs: {reason}" if tabled else Detail(f"no trial of designs: {reason}")
     if "front" in answer:
         yield _front(answer["front"])
     yield from files_of(answer, file="robot file", picture="picture", stl="body for a printer")
@@ -141,8 +143,14 @@ def _confirmed(designs: Sequence[Answer]) -> Table:
     rows = grid("the best designs", *(f"{path}, {unit}".removesuffix(", 1") for path, unit in units.items()))
     for column in ("held, mm/s", "trial, mm/s"):
         rows.add_column(column, justify="right")
-    for one in designs:
-        cells = [cell(one["design"][path], unit) for path, unit in units.items()]
+    for digits in range(4, 10):  # more of them until no two designs look alike
+        labels = [
+            [in_unit(item["value"], item["unit"], units[path], digits) for path, item in one["design"].items()]
+            for one in designs
+        ]
+        if len({*map(tuple, labels)}) == len(designs):
+            break
+    for one, cells in zip(designs, labels, strict=True):
         speeds = [one[motion].get("forward_velocity", {"value": None})["value"] for motion in ("held", "trial")]
         rows.add_row(*cells, *(in_unit(speed, "m/s", "mm/s") for speed in speeds))
     return rows
