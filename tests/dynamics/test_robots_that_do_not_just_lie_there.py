@@ -7,7 +7,9 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
+from spirillum.cli.tables import blocks_of
 from spirillum.dynamics import return_map
+from spirillum.dynamics.run_summary import run_answer
 from spirillum.notes import notes_in
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY
@@ -38,6 +40,7 @@ def test_the_tail_of_a_rising_robot_touches_the_wall() -> None:
     # It floats, which held motion leaves out and a run does not.
     assert "robot-floats" in {note.code for note in sp.load("biorob2012-wide", **{"body.mass": "7.0 g"}).warnings}
     assert "robot-floats" not in {note.code for note in notes_in(found.attrs)}
+    assert "drive on: what a trial of `predict` gives, with its wait and duration" in blocks_of(run_answer(found))
 
 
 @pytest.mark.parametrize("most", [20, 400])

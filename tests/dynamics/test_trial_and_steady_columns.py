@@ -58,6 +58,8 @@ def test_the_held_answer_stays_the_headline(driven: sp.Robot, answer: Any) -> No
     alone, beside = sp.predict(driven, motion="held").to_dict(), answer.to_dict()
     assert {name: beside[name] for name in alone} == alone
     assert set(beside) - set(alone) == {"trial", "steady"}
+    assert str(answer).endswith("answer.trial, answer.steady (values, or why there are none)")
+    assert "answer.trial" not in str(sp.predict(driven, motion="held"))
     assert beside["trial"]["assumption"] == "contact assumed, not validated"
     speeds = [item["forward_velocity"]["value"] for item in (beside, beside["trial"], beside["steady"])]
     assert speeds[0] > speeds[2] > speeds[1] > 0.0
@@ -81,7 +83,7 @@ def test_ends_of_a_posterior_say_whose_interval_they_are(answer: Any) -> None:
     fitted["forward_velocity"] = fitted["forward_velocity"] | {"kind": "interval", "level": 0.95}
     for shown, column in ((fitted, "held "), ({**fitted, "trial": {"reason": "-"}, "steady": {"reason": "-"}}, "")):
         (line,) = (one for one in map(str, blocks_of(shown)) if "95 % interval" in one)
-        assert line == f"{column}low and high: 95 % interval of a tail like those that were fitted"
+        assert line == f"{column}low and high: 95 % interval of the posterior, of a tail like those that were fitted"
 
 
 def test_an_answer_over_poses_alone_says_what_the_lab_shows() -> None:

@@ -143,6 +143,11 @@ class Prediction(DisplayMixin):
         answer = self.to_dict(others=False)
         return answer, headline(answer)
 
+    def __str__(self) -> str:
+        """The held answer as text, and where those of released motion are."""
+        where = "\nreleased: answer.trial, answer.steady (values, or why there are none)"
+        return super().__str__() + (where if self.released and self.robot.channel is not None else "")
+
     def to_dict(self, *, others: bool = True, other_models: bool = True) -> dict[str, Any]:
         """The answer of `spirillum predict --json`; with `others`, trial and steady motion stand in these."""
         beside = self.other_models if others and other_models else None

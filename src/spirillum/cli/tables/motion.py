@@ -57,7 +57,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         yield _over_poses(answer, "held" if released else "value")
     if answer["forward_velocity"].get("kind") == "interval":
         level = f"{100 * answer['forward_velocity']['level']:g} % interval"
-        yield f"{'held ' if released else ''}low and high: {level} {answer['interval_of']}"
+        yield f"{'held ' if released else ''}low and high: {level} of the posterior, {answer['interval_of']}"
     if "trial" in answer:
         yield from released_columns(answer, "; its interval: --interval")
     yield from _in_the_lab(answer, released)
@@ -235,6 +235,8 @@ def simulation(answer: Answer) -> Blocks:
     yield from error_of(answer["error_estimate"])
     whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
     yield Detail(f"last 2/3 of run: over the last two thirds of {whole}, on or off")
+    if "in_tube" in answer:
+        yield "drive on: what a trial of `predict` gives, with its wait and duration"
     yield Detail(f"steady part: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
     yield from sentences_of(answer, "slow-film")
