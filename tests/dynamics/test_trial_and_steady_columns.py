@@ -72,7 +72,8 @@ def test_columns_stand_side_by_side(answer: Any) -> None:
     ]  # fmt: skip
     basis = "released, motor on after 60 s, mean over 20 s; contact assumed, not validated"
     assert f"trial: {basis}; its interval: --interval" in lines
-    assert next(line for line in lines if line.startswith("held: at a fixed pose")).count("held low and high over") == 1
+    (held,) = (line for line in lines if line.startswith("held: at a fixed pose"))
+    assert held.count("held low and high: extremes over") == 1
     (lab,) = (line for line in lines if line.startswith("in the lab"))
     assert lab.endswith("swims as in trial, later as in steady; held is for a known gap and pitch")
 

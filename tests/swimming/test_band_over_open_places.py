@@ -192,7 +192,7 @@ def test_command_line(leaning: Any, capsys: pytest.CaptureFixture[str]) -> None:
     row = next(line for line in out.splitlines() if "forward velocity" in line)
     value, low, high = (float(cell) for cell in row.split("│")[1:4])
     assert low < value < high
-    assert re.search(r"low and high over\s+9\s+more", out)
+    assert re.search(r"low and high:\s+extremes\s+over\s+9\s+more", out)
     assert re.search(
         r"gap 0.5 mm \(open: band over 0.1 to 1 mm\), pitch 0 deg \(open: band over 0 to 5.4\d* deg\)", out
     )

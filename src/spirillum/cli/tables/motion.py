@@ -93,7 +93,7 @@ def _over_poses(answer: Answer, column: str) -> str:
         return given
     ranges = ", ".join(f"{name} {range_words(pose[name])}" for name in ("gap", "pitch") if "low" in pose[name])
     ends = f"{column} low and high" if column == "held" else "low and high"
-    return f"{given}; {ends} over {len(answer['band']['gap']['value'])} more: {ranges}"
+    return f"{given}; {ends}: extremes over {len(answer['band']['gap']['value'])} more: {ranges}"
 
 
 def _compare_with_published(item: Answer) -> str:
