@@ -64,7 +64,7 @@ def content_of(item: Any, **computed: Any) -> dict[str, Any]:
 
 
 def _value(item: Any, path: str, computed: Mapping[str, Any]) -> Any:
-    """What a path names, such as `size.0`; a method is called."""
+    """The value at a path, such as `size.0`; a method is called."""
     if path.startswith("="):
         return path == "=true" or path[1:]
     first, *others = path.split(".")

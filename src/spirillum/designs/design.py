@@ -304,7 +304,7 @@ def _built(given: Robot, space: Space, best: Samples) -> Robot:
 def _warnings(
     given: Robot, unknowns: Unknowns, stated: Evaluation, best: Samples, motion: Swimming, bound_by: Sequence[str]
 ) -> tuple[Note, ...]:
-    """What to be careful about."""
+    """Cautions of the design."""
     found = list(given.warnings)
     known, built = unknowns.robot, _built(unknowns.robot, stated.space, best)
     if given.channel is not None and stated.model.name == "tube":

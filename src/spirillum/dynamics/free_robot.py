@@ -179,7 +179,7 @@ class FreeRobot(ABC):
         return out
 
     def observe_state(self, state: Samples) -> Samples:
-        """What is observed in one state: (13,), or (31,) in a tube."""
+        """Observed quantities of one state: (13,), or (31,) in a tube."""
         return np.asarray(self.observe(np.zeros(1), state[None])[0])
 
     def gaps(self, state: Samples) -> Samples:

@@ -52,7 +52,7 @@ class ResistanceModel(ABC):
         """Requirements of the theory: if violated, the result is NaN in a batch and an `InputError` for one robot."""
 
     def requirements(self, batch: RobotBatch) -> list[Limit]:
-        """What every robot has to fulfil for this model to answer: it can be built, and is inside the domain."""
+        """Requirements without which this model has no answer: the robot can be built, and is inside the domain."""
         return assembly_limits(batch) + self.domain(batch)
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
@@ -80,7 +80,7 @@ class ResistanceModel(ABC):
 
 
 class AxialFlow(NamedTuple):
-    """What the fluid does to a robot that moves along and about its axis, averaged over a turn of the tail."""
+    """Loads of the fluid on a robot that moves along and about its axis, averaged over a turn of the tail."""
 
     resistance: Axial
     load: AxialLoad  #: L of an imposed flow on the robot at rest, N and N m; zero where none is imposed.

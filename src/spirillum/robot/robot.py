@@ -116,7 +116,7 @@ class Robot(RobotTables):
 
     @property
     def seal_doubt(self) -> Note | None:
-        """What is wrong with a seal that reaches beyond the side of the body; None where nothing is."""
+        """Note on a seal that reaches beyond the side of the body; None for one that fits."""
         body, seal = self.body, self.seal
         nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
         longest = body.length - nose

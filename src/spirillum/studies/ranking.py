@@ -65,7 +65,7 @@ SETTLED_BASIS = (
 )
 """Assumptions of the speed after release that the other quantities do not share."""
 BASIS = {STEADY_SPEED: SETTLED_BASIS, HELD: "tube: the channel's walls computed, at a fixed pose"}
-"""What the speed that orders the robots rests on, where it is not that of the ranking's model."""
+"""Assumptions of the speed that orders the robots, where it is not that of the ranking's model."""
 ENDS = {"band": "over the gaps and pitches that are not given", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
 
@@ -174,7 +174,7 @@ class StudyRanking:
 
     @property
     def basis(self) -> str:
-        """What that speed rests on, where it is not that of the model; else empty."""
+        """Assumptions of that speed, where it is not that of the model; else empty."""
         return BASIS.get(self.lead, "")
 
     @property

@@ -61,11 +61,7 @@ def calibration_cautions(model: SwimmerModel, batch: RobotBatch, answered: Flags
     factors = batch.calibration.get(model.name)
     if factors is None or model.placed:
         return []
-    lengths = {
-        path: (getattr(batch, name), getattr(factors, name))
-        for path in _FITTED_TO
-        for name in (path.replace(".", "_"),)
-    }
+    lengths = {path: [getattr(of, path.replace(".", "_")) for of in (batch, factors)] for path in _FITTED_TO}
     apart = {path: ~(np.abs(own - fitted) <= _SAME * fitted) for path, (own, fitted) in lengths.items()}
     outside = reduce(np.logical_or, apart.values()) & answered
     if not (count := int(np.count_nonzero(outside))):

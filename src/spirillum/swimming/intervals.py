@@ -366,7 +366,7 @@ def error_of_mean(
 
 
 def _compared(name: str, predicted: Mapping[str, Samples], tail: ObservedTail) -> Samples:
-    """What was compared: the advance is over the motor's rate where no tail rate was observed."""
+    """Compared quantities: the advance is over the motor's rate where no tail rate was observed."""
     if name == "advance" and tail.by_motor:
         return predicted["advance"] / (1.0 - predicted["turning"])
     return predicted[name]

@@ -68,7 +68,7 @@ def _friction_by_name(answer: Answer) -> dict[str, Answer]:
 
 
 def _friction(answer: Answer) -> Iterator[str | Detail]:
-    """What the effective friction is, and what its interval rests on."""
+    """Definition of the effective friction, and assumptions of its interval."""
     yield (
         f"B_eff: effective rotary friction, eq. (18), friction model {answer['friction']}; tail by tail in "
         "predictions.csv"

@@ -101,7 +101,7 @@ def answered_columns(answer: Answer) -> list[str]:
 
 
 def released_columns(answer: Answer, how_sure: str = "") -> Iterator[Block]:
-    """What the columns of released motions are, or why one is missing; `how_sure` of a trial without an interval."""
+    """Meaning of the columns of released motions, or why one is missing; `how_sure` of a trial without an interval."""
     there = [column for column in RELEASED_COLUMNS if column in answer]
     missing = {column: answer[column]["reason"] for column in there if "reason" in answer[column]}
     for reason in dict.fromkeys(missing.values()):
